@@ -1,9 +1,10 @@
 /*
-  Analyses that move a run which has not begun. Positions that meet the constraints and motions of a time, by Newton's method on the scene's own matrix with rates of zero,
+  Analyses that move a run which has not begun: AssembleAt(), Kinematics() and StaticEquilibrium(). Positions that satisfy the constraints and motions of a time t are found by
+  damped Newton iterations on the scene's own matrix, with all velocities and accelerations zero:
 
-    (F_u + r F_u' + s F_u'') d = (0, Phi),   s large: the smallest d in the metric of the masses,
+    (F_u + r F_u' + s F_u'') d = (0, Phi),   s large: d is the smallest step in the metric of the mass matrix.
 
-  cut short where bodies would go far. Velocities, accelerations and multipliers are those of a consistent start from there.
+  Steps are shortened to largest_turn (still.h). Velocities, accelerations and multipliers are then those of a consistent start from these positions.
 */
 #include "hhtdae/analyses.h"
 #include "guard.h"
@@ -18,21 +19,26 @@ namespace hhtdae
 namespace
 {
 
-constexpr double heavy = 1099511627776.; /* 2^40: masses against stiffnesses */
-constexpr double rates = 0.7310585786300049; /* 1/s, of states: the row of one that integrates what it does not change would be zero without; no round number, which a rate
-                                               might be (Analyses.KinematicsBesideIntegrators) */
-constexpr int    most_iterations = 100, most_cuts = 6;
-constexpr double longest_way = 1e4; /* in moves, between two assemblies */
-constexpr double largest_part = 1; /* rad, of a motion between two assemblies: far enough from half a turn; CountedAngles.KinematicsOverManyTurns */
-constexpr double still = 1e-13; /* parts of the scene's size, radians: a move that is rounding */
+/* s, 1/s^2: 2^40, so that stiffnesses are negligible beside the masses in the metric of a step; as a power of two it adds no rounding */
+constexpr double mass_shift = 1099511627776.;
+/* r, 1/s: with r = 0 the row of a first-order state whose rate does not depend on itself would be zero and the matrix singular. Not a round number, which the rate constant of a
+   user's state might equal and cancel (Analyses.KinematicsBesideIntegrators). */
+constexpr double state_shift       = 0.7310585786300049;
+constexpr int    newton_iterations = 100, max_step_halvings = 6; /* per assembly; per iteration */
+/* Limit on iterations beyond newton_iterations, which are allowed in proportion to the length of the first step (Analyses.KinematicsOfWhatIsGearedUp) */
+constexpr double max_extra_iterations = 1e4;
+/* rad, of any motion between two assemblies: well below half a turn, beyond which full turns of angles would be lost (CountedAngles.KinematicsOverManyTurns) */
+constexpr double max_motion_angle = 1;
+/* Newton steps shorter than this, in radians or parts of the scene's size, are rounding and end the iteration */
+constexpr double negligible_step = 1e-13;
 
-struct Assembling : StillSystem {
+struct AssemblySystem : StillSystem {
   using StillSystem::StillSystem;
-  std::vector<unsigned char> role; /* of own unknowns */
-  double                     misfit = INFINITY;
+  std::vector<unsigned char> role;              /* TSHHT3Role of this rank's unknowns */
+  double                     misfit = INFINITY; /* largest violation of a holonomic constraint, in the unit of its row */
 
-  /* all entries but those of one role to zero */
-  PetscErrorCode keep(TSHHT3Role r, Vec x) const
+  /* Sets all entries of x to zero but those of role r */
+  PetscErrorCode keepRole(TSHHT3Role r, Vec x) const
   {
     double *y;
     PetscFunctionBegin;
@@ -42,19 +48,19 @@ struct Assembling : StillSystem {
     PetscCall(VecRestoreArray(x, &y));
     PetscFunctionReturn(0);
   }
-  /* misfit at u, its rows in F */
-  PetscErrorCode look(Vec u)
+  /* Sets misfit and F, the violations of the holonomic constraints, at u */
+  PetscErrorCode evaluateConstraints(Vec u)
   {
     Unbalanced at;
     PetscFunctionBegin;
     PetscCall(residual(u));
-    PetscCall(keep(TSHHT3_HOLONOMIC, F));
+    PetscCall(keepRole(TSHHT3_HOLONOMIC, F));
     PetscCall(measure(F, at));
     misfit = at.misfit;
     PetscFunctionReturn(0);
   }
-  /* the move x that meets the rows in F as the matrix has them; part: how far that is, infinite if there is none */
-  PetscErrorCode move(Vec x, double *part)
+  /* x: the Newton step for the violations in F; part: its length in units of largest_turn, infinite if the solve fails */
+  PetscErrorCode solveStep(Vec x, double *part)
   {
     KSPConvergedReason reason;
     PetscFunctionBegin;
@@ -62,74 +68,74 @@ struct Assembling : StillSystem {
     PetscCall(KSPSolve(ksp, F, x));
     PetscCall(KSPGetConvergedReason(ksp, &reason));
     if (reason < 0) PetscFunctionReturn(0);
-    PetscCall(keep(TSHHT3_COORDINATE, x));
+    PetscCall(keepRole(TSHHT3_COORDINATE, x));
     PetscCall(reach(x, part));
     PetscFunctionReturn(0);
   }
-  PetscErrorCode direction(double *part)
+  PetscErrorCode newtonStep(double *part)
   {
     PetscFunctionBegin;
-    PetscCall(Jacobian(R, t, U, zero, zero, rates, heavy, J));
-    PetscCall(move(d, part));
+    PetscCall(Jacobian(R, t, U, zero, zero, state_shift, mass_shift, J));
+    PetscCall(solveStep(d, part));
     PetscFunctionReturn(0);
   }
 };
 
 /*
-  As far along d, a move by `part`, as it brings the constraints nearer. Rows are lengths, sines and what users give, which cannot be told to have
-  fallen together; how far the bodies would have to move next, by the same matrix, can (Deuflhard's natural monotonicity test,
-  Analyses.KinematicsInAnyUnitsOfLength).
+  Takes the step d, of length `part` in units of largest_turn, halved until it reduces the violation. Rows have different units (lengths, sines, those of users), so a norm of the
+  violations is no measure of progress. The length of the next simplified Newton step, with the same matrix, is one: Deuflhard's natural monotonicity test
+  (Analyses.KinematicsInAnyUnitsOfLength).
 */
-PetscErrorCode Advance(Assembling &E, double part, bool *nearer)
+PetscErrorCode DampedStep(AssemblySystem &E, double part, bool *improved)
 {
-  double factor = std::min(1.0, 1 / part), left;
+  double fraction = std::min(1.0, 1 / part), left;
   PetscFunctionBegin;
-  *nearer = false;
-  for (int cut = 0; cut <= most_cuts && !*nearer; cut++, factor /= 2) {
-    PetscCall(VecWAXPY(E.next, -factor, E.d, E.U));
-    PetscCall(E.look(E.next));
+  *improved = false;
+  for (int cut = 0; cut <= max_step_halvings && !*improved; cut++, fraction /= 2) {
+    PetscCall(VecWAXPY(E.next, -fraction, E.d, E.U));
+    PetscCall(E.evaluateConstraints(E.next));
     if (!std::isfinite(E.misfit)) continue;
-    PetscCall(E.move(E.A, &left));
-    *nearer = left < part;
+    PetscCall(E.solveStep(E.A, &left));
+    *improved = left < part;
   }
   PetscFunctionReturn(0);
 }
 
-/* Of the constraints at U, for messages; none where they are no numbers */
-PetscErrorCode WorstRow(Assembling &E, std::string *name)
+/* Names the most violated constraint at U, for messages; no name if the violation is infinite or NaN */
+PetscErrorCode WorstRow(AssemblySystem &E, std::string *name)
 {
   const double misfit = E.misfit;
-  PetscReal    most;
+  PetscReal    worst;
   PetscInt     row;
   PetscFunctionBegin;
-  PetscCall(E.look(E.U));
+  PetscCall(E.evaluateConstraints(E.U));
   E.misfit = misfit;
   PetscCall(VecAbs(E.F));
-  PetscCall(VecMax(E.F, &row, &most));
+  PetscCall(VecMax(E.F, &row, &worst));
   if (row >= 0 && std::isfinite(misfit)) *name = ", most in " + UnknownName(*E.R.model, row);
   PetscFunctionReturn(0);
 }
 
-/* From U, V to the nearest positions that meet the constraints at t; velocities go along with the axes of angles */
+/* Moves U to the nearest positions that satisfy the constraints at t; V is transformed where the axes of Euler angles change */
 PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
 {
-  Assembling E(R, t);
+  AssemblySystem E(R, t);
   double     part = INFINITY;
-  bool       nearer;
+  bool           improved;
   PetscFunctionBegin;
   PetscCall(E.create(U, "scene_assembly_"));
   PetscCall(RolesOf(E.R, E.role));
   PetscCall(VecCopy(V, E.V));
-  PetscCall(E.look(E.U));
-  double allowed = most_iterations;
+  PetscCall(E.evaluateConstraints(E.U));
+  double allowed = newton_iterations;
   for (int it = 0; it < allowed && E.misfit > 0; it++) {
     const double before = E.misfit;
-    PetscCall(E.direction(&part));
-    if (it == 0) allowed += std::min(2 * part, longest_way); /* a slow motion may turn what it drives by far (Analyses.KinematicsOfWhatIsGearedUp) */
-    if (!std::isfinite(part) || part * largest_turn <= still) break;
-    PetscCall(Advance(E, part, &nearer));
+    PetscCall(E.newtonStep(&part));
+    if (it == 0) allowed += std::min(2 * part, max_extra_iterations); /* a small motion can drive a large one through gears (Analyses.KinematicsOfWhatIsGearedUp) */
+    if (!std::isfinite(part) || part * largest_turn <= negligible_step) break;
+    PetscCall(DampedStep(E, part, &improved));
     PetscCall(PetscInfo(nullptr, "scene: assembly at t = %g, %d: misfit %g, a step of %g\n", E.t, it, E.misfit, part * largest_turn));
-    if (!nearer) {
+    if (!improved) {
       E.misfit = before;
       break;
     }
@@ -137,8 +143,8 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
     PetscCall(Remember(E.R, E.U, E.zero));
     PetscCall(RenewAxes(E.R, E.U, E.V));
   }
-  /* Rows are within the tolerance as lengths and as sines (Analyses.AssemblyThatFallsShort); or bodies are within it of where the rows are met, as in scenes
-     so large that lengths are rounded by more (Analyses.KinematicsInAnyUnitsOfLength) */
+  /* Either the violations are within the tolerance, as lengths and as sines (Analyses.AssemblyThatFallsShort), or the last Newton step is, as in scenes so large that rounding of
+     lengths exceeds the tolerance (Analyses.KinematicsInAnyUnitsOfLength) */
   const double tolerance = E.R.scene.start.tolerance;
   const bool   met       = E.misfit <= tolerance * std::min(1.0, E.size) || part * largest_turn <= tolerance;
   if (!met) {
@@ -153,23 +159,23 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* The most that a motion turns an angle by between two times */
+/* Largest change of an angle, rad, that a motion prescribes between two times */
 double TurnOfMotions(const SceneData &s, double from, double to)
 {
-  double most = 0, a = 0, b = 0;
+  double worst = 0, a = 0, b = 0;
   for (const StoreBase *store : s.order)
     for (PetscInt e = 0; e < store->size(); e++)
-      if (store->drivenAngle(e, from, &a) && store->drivenAngle(e, to, &b) && store->unknowns(e)) most = std::max(most, std::abs(b - a));
-  return most;
+      if (store->drivenAngle(e, from, &a) && store->drivenAngle(e, to, &b) && store->unknowns(e)) worst = std::max(worst, std::abs(b - a));
+  return worst;
 }
 
-/* The same in parts in which no motion turns far: the nearest positions that meet a motion are right up to full turns, and count fewer */
+/* MeetConstraints() in intervals of time in which no motion turns by more than max_motion_angle: the nearest positions that satisfy a motion determine its angle only up to full turns */
 PetscErrorCode FollowMotions(Runtime &R, double from, double t, Vec U, Vec V)
 {
   PetscFunctionBegin;
   for (double at = from; at != t;) {
     double next = t, middle = at + (t - at) / 2;
-    while (TurnOfMotions(R.scene, at, next) > largest_part && middle != at && middle != next) {
+    while (TurnOfMotions(R.scene, at, next) > max_motion_angle && middle != at && middle != next) {
       next   = middle;
       middle = at + (next - at) / 2;
     }
@@ -191,7 +197,7 @@ PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* Motions may have taken bodies far from where they were: these go there first */
+/* Static equilibrium at t; positions follow the motions to t before */
 PetscErrorCode AtRest(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
 {
   PetscInt  iterations;
@@ -207,7 +213,7 @@ PetscErrorCode AtRest(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* Calls move(run, U, V), which takes ts to another state; after an error the run is where it was */
+/* Calls move(run, U, V), which takes ts to another state; after an error the state of the run is restored */
 template <class Move> PetscErrorCode MoveRun(TS ts, const char *call, const Move &move)
 {
   Runtime  *R;
@@ -222,7 +228,7 @@ template <class Move> PetscErrorCode MoveRun(TS ts, const char *call, const Move
     PetscCall(VecDuplicate(now[k], &kept[k]));
     PetscCall(VecCopy(now[k], kept[k]));
   }
-  const std::vector<CountedAngle> asked  = R->asked;
+  const std::vector<CountedAngle> queried = R->queried_angles;
   const PetscErrorCode            failed = Guarded([&] {
     PetscReal t;
     PetscFunctionBegin;
@@ -232,7 +238,7 @@ template <class Move> PetscErrorCode MoveRun(TS ts, const char *call, const Move
     PetscFunctionReturn(PetscErrorCode(0));
   });
   if (failed) {
-    R->asked = asked;
+    R->queried_angles = queried;
     for (int k = 0; k < 3; k++) PetscCall(VecCopy(kept[k], now[k]));
     PetscCall(UseAxes(*R));
     PetscCall(TSSetTime(ts, before));

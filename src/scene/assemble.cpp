@@ -1,8 +1,8 @@
 /*
-  Initial poses and velocities against the constraints: what does not meet is named, and moved where that is asked for.
+  Checks initial poses and velocities against the constraints: names those that are violated and, with -scene_assemble project, moves the bodies so that they are satisfied.
 
-  Here bodies move as rigid ones, since that is how parts are put together. What is left where flexible bodies take part, as in a press fit or where a motion
-  drives one end of a beam, these have to deform for: that is done on the first state of a run, in the metric of its mass matrix, LeftToDeform().
+  Flexible bodies are moved as rigid ones here. Violations that rigid motions cannot remove, as of a press fit or of a motion that drives one end of a beam, need deformations
+  (LeftToDeform()): the first state of a run is then projected in the metric of its mass matrix.
 */
 #include "start.h"
 #include <algorithm>
@@ -17,15 +17,15 @@ namespace hhtdae
 namespace
 {
 
-constexpr int    assembly_iterations = 100, most_named = 10;
-constexpr double largest_turn = 0.3, largest_move = 0.3; /* in one iteration: radians, parts of the scene's size */
+constexpr int    assembly_iterations = 100, max_named = 10;
+constexpr double max_iteration_turn = 0.3, max_iteration_move = 0.3; /* in one iteration: radians, parts of the scene's size */
 
-/* Misfit of an element in its own units, and relative to the size of the mechanism */
+/* Violation of an element's constraints at position and velocity level: Euclidean norms in the units of its rows, and relative to the size and speed of the mechanism */
 struct Misfit {
   double position = 0, velocity = 0, relative_position = 0, relative_velocity = 0;
 };
 
-/* How fast anything is: what velocities are held against; 0 where nothing moves, rounding in a motion's rate apart */
+/* Largest speed of a body or motion, rotations times size, to which violations at velocity level are related; 0 if it is rounding */
 double Speed(const SceneData &s, const std::vector<RowBlock> &blocks, double size)
 {
   double speed = 0;
@@ -54,7 +54,7 @@ std::vector<Misfit> Misfits(const SceneData &s, const std::vector<RowBlock> &blo
   return all;
 }
 
-/* Maximum, NaN included */
+/* Maximum; NaN if a value is NaN */
 double Largest(const std::vector<Misfit> &m, double Misfit::*of)
 {
   double x = 0;
@@ -70,33 +70,33 @@ std::string Number(double x)
   return o.str();
 }
 
-/* The worst elements beyond a relative misfit, one a line */
-std::string Worst(const SceneData &s, const std::vector<Misfit> &m, double Misfit::*relative, double Misfit::*absolute,
-                  const char *what, double beyond)
+/* Lists the elements whose relative misfit is larger than `beyond`, the worst first, one per line, at most max_named */
+std::string ListWorst(const SceneData &s, const std::vector<Misfit> &m, double Misfit::*relative, double Misfit::*absolute,
+                      const char *what, double beyond)
 {
   std::vector<PetscInt> order;
   for (std::size_t e = 0; e < m.size(); e++)
     if (!(m[e].*relative <= beyond)) order.push_back((PetscInt)e);
   std::stable_sort(order.begin(), order.end(), [&](PetscInt a, PetscInt b) { return m[a].*relative > m[b].*relative; });
   std::string text;
-  for (std::size_t k = 0; k < order.size() && k < most_named; k++)
+  for (std::size_t k = 0; k < order.size() && k < max_named; k++)
     text += "\n  " + std::string(s.elements[order[k]].type) + " " + s.elements[order[k]].name + ": " + what + " by " +
             Number(m[order[k]].*absolute);
-  if (order.size() > most_named) text += "\n  and " + std::to_string(order.size() - most_named) + " more";
+  if (order.size() > max_named) text += "\n  and " + std::to_string(order.size() - max_named) + " more";
   return text;
 }
 
 std::string WorstPositions(const SceneData &s, const std::vector<Misfit> &m, double beyond)
 {
-  return Worst(s, m, &Misfit::relative_position, &Misfit::position, "not met", beyond);
+  return ListWorst(s, m, &Misfit::relative_position, &Misfit::position, "not met", beyond);
 }
 std::string WorstVelocities(const SceneData &s, const std::vector<Misfit> &m, double beyond)
 {
-  return Worst(s, m, &Misfit::relative_velocity, &Misfit::velocity, "velocities violate it", beyond);
+  return ListWorst(s, m, &Misfit::relative_velocity, &Misfit::velocity, "velocities violate it", beyond);
 }
 
-/* d: 6 numbers a body */
-void Move(SceneData &s, const std::vector<double> &d, double factor)
+/* Moves all bodies by factor * d; d: translation and rotation vector, 6 numbers per body */
+void MoveBodiesBy(SceneData &s, const std::vector<double> &d, double factor)
 {
   for (std::size_t i = 0; i < s.bodies.size(); i++) {
     BodyData     &b = s.bodies[i];
@@ -112,14 +112,14 @@ double StepLimit(const std::vector<double> &d, double size)
   double factor = 1;
   for (std::size_t i = 0; i < d.size(); i += 6) {
     const double x = std::hypot(d[i], d[i + 1], d[i + 2]), turn = std::hypot(d[i + 3], d[i + 4], d[i + 5]);
-    if (factor * x > largest_move * size) factor = largest_move * size / x;
-    if (factor * turn > largest_turn) factor = largest_turn / turn;
+    if (factor * x > max_iteration_move * size) factor = max_iteration_move * size / x;
+    if (factor * turn > max_iteration_turn) factor = max_iteration_turn / turn;
   }
   return factor;
 }
 
-/* The misfit as a length in the metric of the masses, to compare one iteration with the next */
-double Merit(const std::vector<RowBlock> &blocks, const std::vector<double> &weight)
+/* Norm of all violations, each divided by the square root of its diagonal entry in Phi_q M^-1 Phi_q^T (weight), which makes rows of different units comparable between iterations */
+double ViolationAsLength(const std::vector<RowBlock> &blocks, const std::vector<double> &weight)
 {
   double      sum = 0;
   std::size_t row = 0;
@@ -129,20 +129,20 @@ double Merit(const std::vector<RowBlock> &blocks, const std::vector<double> &wei
   return std::sqrt(sum);
 }
 
-/* What joints hang together, over bodies that may move, with a flexible body among it and none that fixed_start holds, which would have to be moved along with one that
-   deforms: its number by bodies and elements, -1 of the others */
+/* Groups of movable bodies connected by joints that contain a flexible body and touch no body held by fixed_start, which a deformation would have to move: number of the group by
+   bodies and elements, -1: in none */
 struct Deformable {
   std::vector<PetscInt> body, element;
-  std::vector<char>     deforms, rigid; /* elements in one, and the others */
+  std::vector<char>     deforms, rigid; /* by elements: in such a group, and not */
 };
 
-Deformable FindDeformable(const SceneData &s, Hold hold)
+Deformable FindDeformable(const SceneData &s, FixedBodies fixed_bodies)
 {
-  const std::vector<RowBlock> all = DescribeAll(s, s.start.time, Hold::None);
+  const std::vector<RowBlock> all = DescribeAll(s, s.start.time, FixedBodies::None);
   std::vector<PetscInt>       root(s.bodies.size());
   std::vector<char>           flexible(s.bodies.size(), 0), held(s.bodies.size(), 0);
   const auto                  ofNodes = [&](PetscInt b) { return s.bodies[b].massless && s.bodies[b].carrier < 0; };
-  const auto                  isHeld  = [&](PetscInt b) { return hold == Hold::FixedStart && s.bodies[b].fixed_start && !ofNodes(b); };
+  const auto                  isHeld  = [&](PetscInt b) { return fixed_bodies == FixedBodies::FixedStart && s.bodies[b].fixed_start && !ofNodes(b); };
   const auto                  rootOf  = [&](PetscInt b) {
     while (root[b] != b) b = root[b] = root[root[b]];
     return b;
@@ -175,10 +175,10 @@ Deformable FindDeformable(const SceneData &s, Hold hold)
   return d;
 }
 
-std::vector<RowBlock> BlocksOf(const SceneData &s, Hold hold, const std::vector<char> *part)
+std::vector<RowBlock> BlocksOf(const SceneData &s, FixedBodies fixed_bodies, const std::vector<char> *elements)
 {
-  std::vector<RowBlock> all = DescribeAll(s, s.start.time, hold);
-  if (part) all.erase(std::remove_if(all.begin(), all.end(), [&](const RowBlock &b) { return !(*part)[b.element]; }), all.end());
+  std::vector<RowBlock> all = DescribeAll(s, s.start.time, fixed_bodies);
+  if (elements) all.erase(std::remove_if(all.begin(), all.end(), [&](const RowBlock &b) { return !(*elements)[b.element]; }), all.end());
   return all;
 }
 
@@ -210,32 +210,32 @@ void SetPoses(SceneData &s, const std::vector<Pose> &p)
   }
 }
 
-/* Bodies by how far they went, the farthest first */
+/* Reports the displacements of bodies, the largest first */
 PetscErrorCode ReportMoves(SceneData &s, const std::vector<Pose> &before, const char *what)
 {
-  struct Move {
+  struct Displacement {
     PetscInt body;
     double   distance, angle;
   };
   const double      size = SceneSize(s);
-  std::vector<Move> moves;
+  std::vector<Displacement> moves;
   PetscFunctionBegin;
   for (std::size_t i = 0; i < before.size(); i++) {
     const BodyData &b = s.bodies[i];
-    const Move      m{(PetscInt)i, (b.r - before[i].r).norm(),
-                 std::abs(Eigen::AngleAxisd(Matrix3(b.A * before[i].A.transpose())).angle())};
+    const Displacement m{(PetscInt)i, (b.r - before[i].r).norm(),
+                         std::abs(Eigen::AngleAxisd(Matrix3(b.A * before[i].A.transpose())).angle())};
     s.started.moved  = std::max(s.started.moved, m.distance);
     s.started.turned = std::max(s.started.turned, m.angle);
     if (m.distance > 1e-12 * size || m.angle > 1e-7) moves.push_back(m);
   }
-  std::stable_sort(moves.begin(), moves.end(), [&](const Move &a, const Move &b) {
+  std::stable_sort(moves.begin(), moves.end(), [&](const Displacement &a, const Displacement &b) {
     return a.distance + size * a.angle > b.distance + size * b.angle;
   });
   if (s.start.view)
     PetscCall(PetscPrintf(s.comm, "scene: %s moved %zu of %zu bodies\n", what, moves.size(), before.size()));
   for (std::size_t k = 0; k < moves.size(); k++) {
     const char *name = s.bodies[moves[k].body].name.c_str();
-    if (s.start.view && k < most_named)
+    if (s.start.view && k < max_named)
       PetscCall(PetscPrintf(s.comm, "  %s by %.3g and by %.3g degrees\n", name, moves[k].distance,
                             moves[k].angle * 180 / M_PI));
     else
@@ -245,40 +245,39 @@ PetscErrorCode ReportMoves(SceneData &s, const std::vector<Pose> &before, const 
   PetscFunctionReturn(0);
 }
 
-/* Gauss-Newton: every step is the smallest that meets the linearized constraints; halved where it does not bring them
- * nearer */
-PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok, const std::vector<char> *part)
+/* Gauss-Newton iterations: each step is the smallest, in the metric of the masses, that satisfies the linearized constraints; halved until it reduces the violation */
+PetscErrorCode ProjectPositions(Model &M, FixedBodies fixed_bodies, bool *ok, const std::vector<char> *elements)
 {
   SceneData            &s    = M.scene;
   NearestSystem         system(M);
-  std::vector<RowBlock> blocks = BlocksOf(s, hold, part);
-  const double          size = MechanismSize(s, blocks), enough = 1e-3 * s.start.tolerance;
+  std::vector<RowBlock> blocks = BlocksOf(s, fixed_bodies, elements);
+  const double          size = MechanismSize(s, blocks), target = 1e-3 * s.start.tolerance;
   std::vector<double>   rhs, d, weight;
   double                misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
   PetscFunctionBegin;
   *ok = true;
   if (blocks.empty()) PetscFunctionReturn(0);
-  for (int it = 0, stuck = 0; it < assembly_iterations && misfit > 1e-15 && stuck < 5; it++) {
+  for (int it = 0, stalled = 0; it < assembly_iterations && misfit > 1e-15 && stalled < 5; it++) {
     PetscCall(system.factor(blocks));
     RightHandSide(blocks, &RowBlock::value, rhs);
     PetscCall(system.solve(blocks, rhs, nullptr, d));
     weight                         = system.weights();
-    const double            merit  = Merit(blocks, weight);
+    const double            merit  = ViolationAsLength(blocks, weight);
     const std::vector<Pose> before = Poses(s);
     double                  factor = StepLimit(d, size), next = merit;
     for (int cut = 0; cut < 6; cut++, factor /= 2) {
       SetPoses(s, before);
-      Move(s, d, factor);
-      blocks = BlocksOf(s, hold, part);
-      next   = Merit(blocks, weight);
+      MoveBodiesBy(s, d, factor);
+      blocks = BlocksOf(s, fixed_bodies, elements);
+      next   = ViolationAsLength(blocks, weight);
       if (next < merit) break;
-      if (misfit < enough) break; /* down to rounding */
+      if (misfit < target) break; /* only rounding is left */
     }
-    if (misfit < enough && !(next < merit)) {
+    if (misfit < target && !(next < merit)) {
       SetPoses(s, before);
       break;
     }
-    stuck  = next < 0.99 * merit ? 0 : stuck + 1;
+    stalled = next < 0.99 * merit ? 0 : stalled + 1;
     misfit = Largest(Misfits(s, blocks, size), &Misfit::relative_position);
     s.started.assembly_iterations++;
     PetscCall(
@@ -292,14 +291,14 @@ PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok, const std::vector
 namespace
 {
 
-PetscErrorCode ProjectVelocities(Model &M, Hold hold, const std::vector<char> *part)
+PetscErrorCode ProjectVelocities(Model &M, FixedBodies fixed_bodies, const std::vector<char> *elements)
 {
   SceneData          &s = M.scene;
   NearestSystem       system(M);
   std::vector<double> rhs, d;
   PetscFunctionBegin;
   for (int it = 0; it < 3; it++) {
-    const std::vector<RowBlock> blocks = BlocksOf(s, hold, part);
+    const std::vector<RowBlock> blocks = BlocksOf(s, fixed_bodies, elements);
     if (blocks.empty()) break;
     if (it == 0) PetscCall(system.factor(blocks));
     RightHandSide(blocks, &RowBlock::speed, rhs);
@@ -314,18 +313,18 @@ PetscErrorCode ProjectVelocities(Model &M, Hold hold, const std::vector<char> *p
 
 PetscErrorCode MeasureMisfit(SceneData &s, std::vector<Misfit> &m)
 {
-  const std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None);
+  const std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, FixedBodies::None);
   const double                size   = MechanismSize(s, blocks);
   PetscFunctionBegin;
   s.started.speed =
-      std::max(s.started.speed, Speed(s, blocks, size)); /* of what was given too, where it has vanished */
+      std::max(s.started.speed, Speed(s, blocks, size)); /* the initial speed counts even if a projection has reduced it */
   m                         = Misfits(s, blocks, size);
   s.started.misfit          = Largest(m, &Misfit::relative_position);
   s.started.velocity_misfit = Largest(m, &Misfit::relative_velocity);
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Report(const SceneData &s, const std::vector<Misfit> &m, bool going_on, double left)
+PetscErrorCode CheckInitialValues(const SceneData &s, const std::vector<Misfit> &m, bool going_on, double left)
 {
   const double tol = std::max(s.start.tolerance, left);
   PetscFunctionBegin;
@@ -333,7 +332,7 @@ PetscErrorCode Report(const SceneData &s, const std::vector<Misfit> &m, bool goi
   PetscCheck(positions.empty() && velocities.empty(), s.comm, PETSC_ERR_ARG_WRONG,
              "the initial values violate constraints by more than %g of the mechanism's size (%.3g) or the scene's speed:%s%s\n"
              "Give consistent values, or let the bodies be moved: -scene_assemble project",
-             tol, MechanismSize(s, DescribeAll(s, s.start.time, Hold::None)), positions.c_str(), velocities.c_str());
+             tol, MechanismSize(s, DescribeAll(s, s.start.time, FixedBodies::None)), positions.c_str(), velocities.c_str());
   if (s.started.misfit > 0 || s.started.velocity_misfit > 0)
     PetscCall(PetscInfo(nullptr, "scene: initial values within the tolerance, misfit %g, of velocities %g%s%s\n",
                         s.started.misfit, s.started.velocity_misfit, WorstPositions(s, m, 1e-3 * tol).c_str(),
@@ -341,18 +340,18 @@ PetscErrorCode Report(const SceneData &s, const std::vector<Misfit> &m, bool goi
   PetscFunctionReturn(0);
 }
 
-std::vector<Misfit> OfRigid(std::vector<Misfit> m, const Deformable &d)
+std::vector<Misfit> OnRigidElements(std::vector<Misfit> m, const Deformable &d)
 {
   for (std::size_t e = 0; e < m.size(); e++)
     if (d.deforms[e]) m[e] = Misfit();
   return m;
 }
 
-/* Where no direction brings constraints nearer, as shafts of a constant velocity joint that stand a quarter turn apart, any other place serves: this far away, radians and
-   parts of the scene's size (SceneAssembly.AQuarterTurnOff) */
-constexpr double disturbance = 1e-3;
+/* Assembly is repeated from poses perturbed at random by this, in radians and parts of the scene's size, if the violation cannot be reduced along the gradient, as when the shafts of a
+   constant velocity joint are a quarter turn apart (SceneAssembly.AQuarterTurnOff) */
+constexpr double perturbation = 1e-3;
 
-void Disturb(SceneData &s, const std::vector<RowBlock> &blocks)
+void Perturb(SceneData &s, const std::vector<RowBlock> &blocks)
 {
   std::mt19937                           random(1);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -363,49 +362,49 @@ void Disturb(SceneData &s, const std::vector<RowBlock> &blocks)
     for (PetscInt k : b.body) moves[k] = 1;
   for (std::size_t i = 0; i < s.bodies.size(); i++)
     for (int k : Directions(KindOf(s, s.bodies[i]))) {
-      const double x = uniform(random); /* as many as there are, whoever moves */
+      const double x = uniform(random); /* drawn also for bodies that do not move, so that the others' numbers do not depend on them */
       if (moves[i]) d[6 * i + k] = x * (k < 3 ? size : 1);
     }
-  Move(s, d, disturbance);
+  MoveBodiesBy(s, d, perturbation);
 }
 
-PetscErrorCode AssemblePositions(Model &M, Hold hold, const Deformable &d)
+PetscErrorCode AssemblePositions(Model &M, FixedBodies fixed_bodies, const Deformable &d)
 {
   SceneData              &s      = M.scene;
   const std::vector<Pose> before = Poses(s);
   std::vector<Misfit>     m;
   bool                    ok;
   PetscFunctionBegin;
-  PetscCall(ProjectPositions(M, hold, &ok, &d.rigid));
+  PetscCall(ProjectPositions(M, fixed_bodies, &ok, &d.rigid));
   if (!ok) {
     PetscCall(MeasureMisfit(s, m));
-    const std::string left = WorstPositions(s, OfRigid(m, d), s.start.tolerance);
+    const std::string left = WorstPositions(s, OnRigidElements(m, d), s.start.tolerance);
     SetPoses(s, before);
-    Disturb(s, BlocksOf(s, hold, &d.rigid));
-    PetscCall(PetscInfo(nullptr, "scene: assembly once more, from positions that are %g away\n", disturbance));
-    PetscCall(ProjectPositions(M, hold, &ok, &d.rigid));
+    Perturb(s, BlocksOf(s, fixed_bodies, &d.rigid));
+    PetscCall(PetscInfo(nullptr, "scene: assembly once more, from positions that are %g away\n", perturbation));
+    PetscCall(ProjectPositions(M, fixed_bodies, &ok, &d.rigid));
     if (!ok) SetPoses(s, before);
     PetscCheck(ok, s.comm, PETSC_ERR_CONV_FAILED,
                "the scene cannot be assembled; after %d iterations these constraints are not met:%s\n"
                "Start nearer to where they are met, or free a body that is held by fixed_start",
                (int)s.started.assembly_iterations, left.c_str());
   }
-  PetscCall(ProjectPositions(M, hold, &ok, &d.deforms)); /* the rest is left to the run */
+  PetscCall(ProjectPositions(M, fixed_bodies, &ok, &d.deforms)); /* remaining violations are removed by deformations at the start of the run */
   PetscFunctionReturn(0);
 }
 
-/* Velocities that rigid motions cannot meet stay as they are given where flexible bodies take part: the nearest ones are those after a plastic impact, which makes bodies
-   vibrate. So do all of these in a run that goes on, where new joints take hold of what vibrates. */
-PetscErrorCode AssembleVelocities(Model &M, Hold hold, const Deformable &d)
+/* In groups with flexible bodies, initial velocities that rigid motions cannot make consistent are left as given: the start of the run then takes the nearest consistent ones, those after
+   a plastic impact, which excites vibrations. In a run that continues another one this holds for all such groups, since new joints may connect vibrating bodies. */
+PetscErrorCode AssembleVelocities(Model &M, FixedBodies fixed_bodies, const Deformable &d)
 {
   SceneData          &s = M.scene;
   std::vector<Misfit> m;
-  std::vector<char>   impact(s.bodies.size(), 0); /* by the numbers of what hangs together */
+  std::vector<char>   impact(s.bodies.size(), 0); /* by number of the group */
   PetscFunctionBegin;
-  PetscCall(ProjectVelocities(M, hold, &d.rigid));
+  PetscCall(ProjectVelocities(M, fixed_bodies, &d.rigid));
   if (M.continues) PetscFunctionReturn(0);
   const std::vector<Pose> before = Poses(s);
-  PetscCall(ProjectVelocities(M, hold, &d.deforms));
+  PetscCall(ProjectVelocities(M, fixed_bodies, &d.deforms));
   PetscCall(MeasureMisfit(s, m));
   for (std::size_t e = 0; e < m.size(); e++)
     if (d.deforms[e] && !(m[e].relative_velocity <= s.start.tolerance)) impact[d.element[e]] = 1;
@@ -419,7 +418,7 @@ PetscErrorCode AssembleVelocities(Model &M, Hold hold, const Deformable &d)
 
 } // namespace
 
-std::vector<char> RigidElements(const SceneData &s, Hold hold) { return FindDeformable(s, hold).rigid; }
+std::vector<char> RigidElements(const SceneData &s, FixedBodies fixed_bodies) { return FindDeformable(s, fixed_bodies).rigid; }
 
 bool LeftToDeform(const SceneData &s)
 {
@@ -434,17 +433,17 @@ PetscErrorCode Assemble(Model &M)
   PetscFunctionBegin;
   if (s.start.assembly == Assembly::Off) PetscFunctionReturn(0);
   PetscCall(MeasureMisfit(s, m));
-  const Hold hold = M.continues ? Hold::Nodes : Hold::FixedStart; /* fixed_start is of the start */
+  const FixedBodies fixed_bodies = M.continues ? FixedBodies::Nodes : FixedBodies::FixedStart; /* fixed_start applies to the first run only */
   if (s.start.assembly == Assembly::Report) {
-    PetscCall(Report(s, m, M.continues, M.left));
+    PetscCall(CheckInitialValues(s, m, M.continues, M.inherited_misfit));
     PetscFunctionReturn(0);
   }
-  const Deformable d = FindDeformable(s, hold);
-  if (s.started.misfit > 0) PetscCall(AssemblePositions(M, hold, d));
+  const Deformable d = FindDeformable(s, fixed_bodies);
+  if (s.started.misfit > 0) PetscCall(AssemblePositions(M, fixed_bodies, d));
   PetscCall(MeasureMisfit(s, m));
-  if (s.started.velocity_misfit > 0) PetscCall(AssembleVelocities(M, hold, d));
+  if (s.started.velocity_misfit > 0) PetscCall(AssembleVelocities(M, fixed_bodies, d));
   PetscCall(MeasureMisfit(s, m));
-  const std::string left = WorstVelocities(s, OfRigid(m, d), s.start.tolerance);
+  const std::string left = WorstVelocities(s, OnRigidElements(m, d), s.start.tolerance);
   if (!left.empty()) SetPoses(s, before);
   PetscCheck(left.empty(), s.comm, PETSC_ERR_CONV_FAILED,
              "no initial velocities satisfy all constraints:%s\n"

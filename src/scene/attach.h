@@ -1,6 +1,6 @@
 /*
-  Attachments of flexible bodies in the description: a frame of its own, a body without mass, which six constraints hold at the point of the flexible body that
-  follows its modes. Assembly and the search for redundant constraints see them; a run has neither their coordinates nor their multipliers, see carrier.h.
+  Attachments of flexible bodies in the description: each is a frame, described as a body without mass, which six constraints fix to a point of the flexible body that
+  follows its modes. Only assembly and the redundancy check use them; a run has neither coordinates nor multipliers for them, see carrier.h.
 
     x_i - x_e = 0,  axes of i parallel to those of e,   x_e = r + A (s + Psi_x eta),  R_e = A exp([Psi_theta eta])
 */
@@ -30,15 +30,15 @@ public:
   int           rows() const override { return 6; }
   unsigned char active(PetscInt) const override { return 0x3f; }
   bool          isExplicit() const override { return true; }
-  bool          everIndependent() const override { return true; } /* each has a frame of its own */
-  bool          curves() const override { return false; }
+  bool                   neverRedundant() const override { return true; } /* no two attachments have the same frame */
+  bool                   hasGeometricStiffness() const override { return false; }
   bool          usesVelocities() const override { return false; }
   void          localize(Localizer &, std::vector<std::unique_ptr<Batch>> &) const override {}
   void          describe(const SceneData &s, PetscInt e, double t, DescribedRows &rows) const override;
   std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override;
 };
 
-/* Of a probe that reads an attachment: memories of the elements on it, as the batches of the run have them */
+/* Copies the memories of the elements on an attachment from the run's batches to its probe */
 void RecallMemories(Probe &p, const std::vector<std::unique_ptr<Batch>> &batches);
 
 } // namespace hhtdae

@@ -31,8 +31,8 @@ public:
         const LocalBody &b = bodyOf(B, e, k);
         for (int g = 0; g < Groups(b.kind); g++) {
           if (!uses(b.kind, g, k)) continue;
-          /* rows that follow the origin direction by direction, complete */
-          const bool diagonal = K::translates && g == 0 && GroupSize(b.kind, g) == R && (e.active & all_rows) == all_rows;
+          /* the block is diagonal if all rows are components of x_j - x_i */
+          const bool diagonal = K::purely_translational && g == 0 && GroupSize(b.kind, g) == R && (e.active & all_rows) == all_rows;
           request_.push_back(p.need(e.group, b.group + g, diagonal));
           request_.push_back(p.need(b.group + g, e.group, diagonal));
         }
@@ -60,7 +60,7 @@ public:
       gather(ev, e, f, w, lambda, z);
       if constexpr (K::holonomic) {
         K::value(e.data, f, ev.t, phi);
-        if constexpr (!K::translates) K::gradient(e.data, f, ev.t, J);
+        if constexpr (!K::purely_translational) K::gradient(e.data, f, ev.t, J);
       } else {
         value(e, f, w, ev.t, z, phi);
         gradient(e, f, w, ev.t, z, J, P, nullptr);
@@ -152,7 +152,7 @@ private:
     return bits;
   }
 
-  /* the velocity of an attachment's frame has columns of its own */
+  /* the velocity of an attachment's frame has separate columns */
   static bool byRates(BodyKind b) { return !K::holonomic && b == BodyKind::Attached; }
 
   static void value(const Instance &e, const Frame<double> *f, const Twist<double> *w, double t, const double *z, double *psi)
@@ -170,7 +170,7 @@ private:
   /* - Phi_q^T lambda as a load */
   static void react(Bodies &B, const Instance &e, const Frame<double> *f, const double *lambda, const typename K::Gradient &J)
   {
-    if constexpr (K::translates) { /* no need to multiply by ones and zeros */
+    if constexpr (K::purely_translational) { /* no need to multiply by ones and zeros */
       Vector3 force = Vector3::Zero();
       std::copy(lambda, lambda + R, force.data());
       B.load(e.marker[0], f[0], force, Vector3::Zero());
@@ -200,7 +200,7 @@ private:
     (void)zj;
   }
 
-  /* d(Phi_q^T lambda)/dq, but for what the body itself adds */
+  /* d(Phi_q^T lambda)/dq, without d(G^T m)/dq, which the body adds */
   static void curvatureBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, const Twist<double> *w, const double *z,
                               const double *lambda, const typename K::Gradient &J, const Slot *&slot)
   {

@@ -1,4 +1,4 @@
-/* A run that goes on where another one is, with a description that may have changed. */
+/* A run that continues another one from its present state, with a description that may have changed; states of runs before the first step. */
 #include "extension.h"
 #include "guard.h"
 #include "journal.h"
@@ -13,7 +13,7 @@ namespace hhtdae
 namespace
 {
 
-/* Whether what was described anew has the coordinates, variables and states of before */
+/* Whether two descriptions have the same coordinates, variables and states */
 bool SameUnknowns(const SceneData &a, const SceneData &b)
 {
   bool same = a.bodies.size() == b.bodies.size() && a.variables.size() == b.variables.size() && a.states.size() == b.states.size() &&
@@ -23,8 +23,8 @@ bool SameUnknowns(const SceneData &a, const SceneData &b)
   return same;
 }
 
-/* Of variables, states, channels and users' functions; what joints and forces remember is in their description, CarryTurns() */
-std::vector<Batch *> FunctionsThatRemember(const Runtime &R)
+/* Batches with memory that does not come from elements: of variables, states, channels and users' functions; for elements see CopyElementMemories() */
+std::vector<Batch *> FunctionsWithMemory(const Runtime &R)
 {
   std::vector<Batch *> all;
   for (const auto &b : R.batches)
@@ -32,7 +32,7 @@ std::vector<Batch *> FunctionsThatRemember(const Runtime &R)
   return all;
 }
 
-/* Numbers that an element remembers, and angles that its formulas read */
+/* Number of values that an element stores of accepted steps, and of angles that its expressions read */
 int Memory(const SceneData &s, std::size_t e)
 {
   int n = 0;
@@ -46,7 +46,7 @@ int Memory(const SceneData &s, std::size_t e)
   return n;
 }
 
-PetscErrorCode RefuseToCarry(const SceneData &s, const std::string &what)
+PetscErrorCode RefuseToContinue(const SceneData &s, const std::string &what)
 {
   SETERRQ(s.comm, PETSC_ERR_SUP,
           "a run cannot go on when elements have come or gone that count angles over full turns or follow a curve, as %s: let joints, motions or forces come and go in their place (of "
@@ -60,21 +60,21 @@ PetscErrorCode CheckMemories(const SceneData &from, const SceneData &to)
   for (std::size_t e = 0; e < std::max(from.elements.size(), to.elements.size()); e++) {
     const int before = Memory(from, e), after = Memory(to, e);
     if (before == after) continue;
-    const ElementData &of = (before ? from : to).elements[e]; /* where it is there */
-    PetscCall(RefuseToCarry(to, std::string(of.type) + " " + of.name + " has"));
+    const ElementData &of = (before ? from : to).elements[e]; /* in the description that has the memory */
+    PetscCall(RefuseToContinue(to, std::string(of.type) + " " + of.name + " has"));
   }
   PetscFunctionReturn(0);
 }
 
-/* Angles over full turns that functions read, which go on from where they are */
-PetscErrorCode CarryMemories(const Runtime &from, Runtime &to)
+/* Copies memories of functions: angles over full turns */
+PetscErrorCode CopyFunctionMemories(const Runtime &from, Runtime &to)
 {
-  const std::vector<Batch *> a = FunctionsThatRemember(from), b = FunctionsThatRemember(to);
+  const std::vector<Batch *> a = FunctionsWithMemory(from), b = FunctionsWithMemory(to);
   int                        same = a.size() == b.size();
   PetscFunctionBegin;
   for (std::size_t k = 0; same && k < a.size(); k++) same = a[k]->memory() == b[k]->memory();
   if (to.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, to.scene.comm));
-  if (!same) PetscCall(RefuseToCarry(to.scene, "some have that channels, variables or formulas read"));
+  if (!same) PetscCall(RefuseToContinue(to.scene, "some have that channels, variables or formulas read"));
   for (std::size_t k = 0; k < a.size(); k++) {
     std::vector<double> memory(a[k]->memory());
     a[k]->copyMemory(memory.data(), false);
@@ -84,8 +84,8 @@ PetscErrorCode CarryMemories(const Runtime &from, Runtime &to)
   PetscFunctionReturn(0);
 }
 
-/* The parts of an element that remember */
-std::vector<Part> Remembering(const ElementData &e)
+/* The parts of an element with memory */
+std::vector<Part> PartsWithMemory(const ElementData &e)
 {
   std::vector<Part> all;
   for (const Part &p : e.parts)
@@ -93,8 +93,8 @@ std::vector<Part> Remembering(const ElementData &e)
   return all;
 }
 
-/* Angles over full turns and points on curves, which go on from where they are: in the description, by which assembly goes before there is a run */
-PetscErrorCode CarryTurns(const Runtime &from, SceneData &to)
+/* Copies memories of elements, angles over full turns and points on curves, to the description, which assembly uses before there is a run */
+PetscErrorCode CopyElementMemories(const Runtime &from, SceneData &to)
 {
   std::vector<double>                           x;
   std::vector<int>                              found;
@@ -103,7 +103,7 @@ PetscErrorCode CarryTurns(const Runtime &from, SceneData &to)
   PetscCall(CheckMemories(from.scene, to));
   for (std::size_t e = 0; e < to.elements.size(); e++) {
     if (!Memory(to, e)) continue;
-    const std::vector<Part> a = Remembering(from.scene.elements[e]), b = Remembering(to.elements[e]);
+    const std::vector<Part> a = PartsWithMemory(from.scene.elements[e]), b = PartsWithMemory(to.elements[e]);
     for (std::size_t k = 0; k < std::min(a.size(), b.size()); k++) {
       const std::size_t at = x.size();
       const int         n  = b[k].store->memory();
@@ -115,7 +115,7 @@ PetscErrorCode CarryTurns(const Runtime &from, SceneData &to)
       into.push_back({b[k].store, b[k].index});
     }
   }
-  /* the ranks that have an element have the same numbers of it */
+  /* ranks that have an element have the same memory of it; others take part with -infinity in the maximum */
   if (from.size > 1) {
     for (std::size_t i = 0, at = 0; i < into.size(); at += into[i++].first->memory())
       if (!found[i]) std::fill_n(x.begin() + at, into[i].first->memory(), -std::numeric_limits<double>::infinity());
@@ -127,7 +127,7 @@ PetscErrorCode CarryTurns(const Runtime &from, SceneData &to)
   PetscFunctionReturn(0);
 }
 
-/* The same model: its vectors */
+/* Copies the state between runs of the same model */
 PetscErrorCode CopyState(const Runtime &from, TS ts, Runtime &to, TS next)
 {
   Vec U, V, X, Y;
@@ -138,7 +138,7 @@ PetscErrorCode CopyState(const Runtime &from, TS ts, Runtime &to, TS next)
   PetscCall(VecCopy(V, Y));
   PetscCall(VecCopy(from.axes, to.axes));
   PetscCall(UseAxes(to));
-  to.asked = from.asked;
+  to.queried_angles = from.queried_angles;
   PetscFunctionReturn(0);
 }
 
@@ -150,7 +150,7 @@ PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R)
   PetscFunctionBegin;
   *R = RunOf(ts);
   PetscCheck(*R, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG, "%s: the TS is not one of a scene, Scene::createTS() makes them", call);
-  PetscCall(ReadCheckpoint(ts)); /* a run that goes on from one has begun */
+  PetscCall(ReadCheckpoint(ts)); /* a run continued from a checkpoint has begun */
   PetscCall(TSGetStepNumber(ts, &steps));
   PetscCheck(!steps, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "%s: the run has begun and is not to be moved; make one that goes on from it, Scene::createTS(&next, ts)", call);
@@ -171,16 +171,16 @@ PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
   Runtime  *R = RunOf(ts);
   PetscReal t, end, atol, rtol;
   PetscFunctionBegin;
-  PetscCall(CheckUnchanged(R->scene, R->scene.start_given)); /* elements that came too late have no unknowns */
+  PetscCall(CheckUnchanged(R->scene, R->scene.start_given)); /* elements added after the set-up have no unknowns */
   PetscCall(CreateRun(R->model, copy));
   PetscCall(CopyState(*R, ts, *RunOf(*copy), *copy));
   PetscCall(TSGetTime(ts, &t));
   PetscCall(TSGetTolerances(ts, &atol, nullptr, &rtol, nullptr));
   PetscCall(TSSetTolerances(*copy, atol, nullptr, rtol, nullptr));
   PetscCall(TSSetTime(*copy, t));
-  PetscCall(TSGetMaxTime(ts, &end)); /* as long as the run is, where it has an end: no unit of time is known otherwise */
+  PetscCall(TSGetMaxTime(ts, &end)); /* the duration of the run, if it has an end, gives the first step its time scale */
   if (end < PETSC_MAX_REAL / 2 && end > R->scene.start.time) PetscCall(TSSetMaxTime(*copy, t + end - R->scene.start.time));
-  PetscCall(TSSetMaxSteps(*copy, 1)); /* for PETSc, which wants an end */
+  PetscCall(TSSetMaxSteps(*copy, 1)); /* PETSc requires an end */
   PetscCall(TSHHT3SetStart(*copy, start));
   PetscCall(TSStep(*copy));
   PetscFunctionReturn(0);
@@ -236,7 +236,7 @@ PetscErrorCode StateOfStart(TS ts, PetscReal t, Vec state[3], TS *copy)
 namespace
 {
 
-/* A change is one everywhere: ranks whose values differ would wait for each other */
+/* Whether parameters have changed since the last step on any rank; all ranks have to take the same branch */
 PetscErrorCode ParametersChanged(const Runtime &R, PetscBool *changed)
 {
   PetscMPIInt other = R.step_parameters != ParametersNow(R.scene);
@@ -258,7 +258,7 @@ PetscErrorCode PresentState(TS ts, Vec state[3], PetscBool *done)
   PetscFunctionReturn(0);
 }
 
-/* Other TS types know neither accelerations nor times between steps */
+/* Other TS types have neither accelerations nor a state between steps */
 PetscErrorCode StateOfOtherType(TS ts, PetscReal t, Vec state[3])
 {
   PetscReal now;
@@ -304,7 +304,7 @@ PetscErrorCode StateAt(TS ts, PetscReal t, bool from_equations, Vec state[3], TS
 namespace
 {
 
-PetscErrorCode CompleteBy(TS ts, Runtime &R, Vec A, TS *copy)
+PetscErrorCode ProjectByCopy(TS ts, Runtime &R, Vec A, TS *copy)
 {
   PetscReal t;
   Vec       U, V;
@@ -329,31 +329,31 @@ PetscErrorCode ToNearestConsistent(TS ts)
   PetscFunctionBegin;
   PetscCall(TSGetSolution(ts, &U));
   PetscCall(VecDuplicate(U, &A));
-  const PetscErrorCode failed = CompleteBy(ts, R, A, &copy); /* dropped rows may be violated there: the two go all the same */
+  const PetscErrorCode failed = ProjectByCopy(ts, R, A, &copy); /* A and copy are to be destroyed even if dropped rows are violated there */
   PetscCall(VecDestroy(&A));
   PetscCall(TSDestroy(&copy));
   PetscCall(failed);
   PetscFunctionReturn(0);
 }
 
-/* Rows of constraints that are not met at rest, or not for long: those of motions that do not stand still */
-static PetscErrorCode Moving(Runtime &R, double t, Vec U, Vec V, PetscBool *moving)
+/* Whether motions move: constraints at velocity level are violated at rest, or holonomic ones change within a small time */
+static PetscErrorCode HasMovingMotions(Runtime &R, double t, Vec U, Vec V, PetscBool *moving)
 {
-  const double soon = 1e-6 * std::max(1., std::abs(t));
+  const double time_difference = 1e-6 * std::max(1., std::abs(t));
   Vec          now, later, rows;
-  double       most;
+  double       largest;
   PetscFunctionBegin;
   *moving = PETSC_FALSE;
   PetscCall(VecDuplicate(U, &now));
   PetscCall(VecDuplicate(U, &later));
   PetscCall(Residual(R, t, U, V, V, now));
-  PetscCall(Residual(R, t + soon, U, V, V, later));
+  PetscCall(Residual(R, t + time_difference, U, V, V, later));
   PetscCall(VecAXPY(later, -1, now));
   for (const auto &[role, F] : {std::pair(TSHHT3_HOLONOMIC, later), std::pair(TSHHT3_NONHOLONOMIC, now)}) {
     PetscCall(VecGetSubVector(F, R.roles[role], &rows));
-    PetscCall(VecNorm(rows, NORM_INFINITY, &most));
+    PetscCall(VecNorm(rows, NORM_INFINITY, &largest));
     PetscCall(VecRestoreSubVector(F, R.roles[role], &rows));
-    if (most > 0) *moving = PETSC_TRUE;
+    if (largest > 0) *moving = PETSC_TRUE;
   }
   PetscCall(VecDestroy(&now));
   PetscCall(VecDestroy(&later));
@@ -376,7 +376,7 @@ PetscErrorCode StartWithMotions(TS ts)
   if (R.scene.start.assembly == Assembly::Off) PetscFunctionReturn(0);
   PetscCall(TSGetTime(ts, &t));
   PetscCall(TS2GetSolution(ts, &U, &V));
-  PetscCall(Moving(R, t, U, V, &moving));
+  PetscCall(HasMovingMotions(R, t, U, V, &moving));
   if (moving) PetscCall(TSHHT3SetStart(ts, TSHHT3_START_PROJECT));
   PetscFunctionReturn(0);
 }
@@ -403,26 +403,26 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
                "Scene::createTS(): the run cannot go on, since bodies, variables or states of the scene are not those that it was made with");
     M.continues    = true;
     M.begin        = t;
-    M.first        = old->model->continues ? old->model->first : old->scene.start.time;
+    M.first_begin         = old->model->continues ? old->model->first_begin : old->scene.start.time;
     M.number.owner = old->number.owner;
-    M.left         = 1e-2 * (atol + rtol) / std::max(MechanismSize(M.scene, DescribeAll(M.scene, t, Hold::None)), 1e-2 * (atol + rtol)); /* ten times what its corrector leaves (Continue.ChainOfRuns) */
-    PetscErrorCode failed = CarryTurns(*old, M.scene);
+    M.inherited_misfit    = 1e-2 * (atol + rtol) / std::max(MechanismSize(M.scene, DescribeAll(M.scene, t, FixedBodies::None)), 1e-2 * (atol + rtol)); /* ten times the error that the corrector of the old run leaves (Continue.ChainOfRuns) */
+    PetscErrorCode failed = CopyElementMemories(*old, M.scene);
     if (!failed) failed = WriteState(M, *old, U, V);
     if (!failed) failed = createTS(ts);
-    journal_->stale = true; /* this model is of this run alone; the next one from the start is described anew */
+    journal_->stale = true; /* this model belongs to this run only; the next run from the start needs a new description */
     PetscCall(failed);
-    PetscCall(CarryMemories(*old, *RunOf(*ts)));
+    PetscCall(CopyFunctionMemories(*old, *RunOf(*ts)));
     Vec X, Y;
     PetscCall(TS2GetSolution(*ts, &X, &Y));
     PetscCall(CarryAngles(*old, U, V, *RunOf(*ts), X, Y));
-    /* A run leaves constraints as nearly met as its tolerance wants, and what takes hold of moving bodies is an impact (Continue.ImpactOfALinkWithoutMass) */
+    /* The old run satisfies constraints only to its tolerance, and new joints between moving bodies are an impact (Continue.ImpactOfALinkWithoutMass) */
     if (M.scene.started.misfit > 0 || M.scene.started.velocity_misfit > 0) PetscCall(ToNearestConsistent(*ts));
     PetscFunctionReturn(0);
   }
   PetscCall(createTS(ts));
   PetscCall(CopyState(*old, from, *RunOf(*ts), *ts));
   PetscCall(TSSetTime(*ts, t));
-  /* Velocities at the end of a step meet constraints to second order, those that a run begins with have to meet them (Continue.ChainOfRuns) */
+  /* Velocities at the end of a step satisfy the constraints to second order; initial ones must be consistent (Continue.ChainOfRuns) */
   PetscInt steps, rows[2];
   PetscCall(TSGetStepNumber(from, &steps));
   PetscCall(ISGetSize(RunOf(*ts)->roles[TSHHT3_HOLONOMIC], &rows[0]));

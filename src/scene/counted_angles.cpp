@@ -1,6 +1,6 @@
 /*
-  Angles that questions have asked a run for, counted over full turns. Every accepted state brings each of them up to date, Remember(),
-  whether the step was the integrator's or that of an analysis.
+  Angles between markers that queries have asked for, counted over full turns: Remember() updates them at every accepted state of the
+  integrator or of an analysis.
 */
 #include "kernels/angle.h"
 #include "runtime.h"
@@ -12,10 +12,10 @@ namespace hhtdae
 namespace
 {
 
-/* x_i, x_j and y_j, and by what their bodies have turned in a planar scene */
+/* x_i, x_j and y_j; in a planar scene also the difference of their bodies' angles */
 using Axes = std::array<double, 10>;
 
-/* What this rank knows of it, zero elsewhere; the first rank knows the ground */
+/* Adds this rank's part for a marker: the owner of its body adds it, for the ground the first rank; about: marker j */
 void AddAxes(const Runtime &R, const double *u, PetscInt marker, bool about, Axes &sum)
 {
   const MarkerData &m  = R.scene.markers[marker];
@@ -48,7 +48,7 @@ double PrincipalOf(const Axes &x)
   return std::atan2(yj.dot(xi), xj.dot(xi));
 }
 
-/* The marker's axes with its body as it was described */
+/* The marker's axes with the described attitude of its body */
 Frame<double> AsDescribed(const Model &M, Marker m)
 {
   Frame<double>  f = M.scene.frame(m);
@@ -57,20 +57,20 @@ Frame<double> AsDescribed(const Model &M, Marker m)
   return f;
 }
 
-/* The angle of a planar body at the start, as its unknown has it */
-double StartOf(const SceneData &s, PetscInt marker)
+/* Initial value of the angle unknown of a planar body */
+double InitialPlanarAngle(const SceneData &s, PetscInt marker)
 {
   const PetscInt b = s.markers[marker].body;
   return b < 0 || s.bodies[b].point ? 0 : std::atan2(s.bodies[b].A(1, 0), s.bodies[b].A(0, 0));
 }
 
-/* What a motion has made of the angle since the first run's start, where there is one that drives it */
-bool AngleOfMotion(const Model &M, double t, PetscInt i, PetscInt j, double *angle)
+/* The angle at t by the motion that prescribes it, counted from the start of the first run; false if there is none */
+bool PrescribedAngle(const Model &M, double t, PetscInt i, PetscInt j, double *angle)
 {
   double from, to;
   for (const StoreBase *store : M.scene.order)
     for (PetscInt e = 0; e < store->size(); e++) {
-      if (!store->drivenAngle(e, M.continues ? M.first : M.scene.start.time, &from) || store->marker(e, 0) != i || store->marker(e, 1) != j) continue;
+      if (!store->drivenAngle(e, M.continues ? M.first_begin : M.scene.start.time, &from) || store->marker(e, 0) != i || store->marker(e, 1) != j) continue;
       store->drivenAngle(e, t, &to);
       *angle = (M.continues ? std::remainder(from, 2 * M_PI) : StartAngle(M, Marker{i}, Marker{j})) + to - from;
       return true;
@@ -80,7 +80,7 @@ bool AngleOfMotion(const Model &M, double t, PetscInt i, PetscInt j, double *ang
 
 } // namespace
 
-/* In (-pi, pi] as the bodies are described; from there assembly and equilibrium have turned them by less than half a turn */
+/* In the description the angle is in (-pi, pi]; assembly and equilibrium are taken to have changed it by less than half a turn */
 double StartAngle(const Model &M, Marker i, Marker j)
 {
   return Unwind<double>(PrincipalAngle<double>(M.scene.frame(i), M.scene.frame(j)), PrincipalAngle<double>(AsDescribed(M, i), AsDescribed(M, j)));
@@ -107,27 +107,27 @@ PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<Counte
 PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first)
 {
   const SceneData          &s    = R.scene;
-  double                    most = PETSC_NINFINITY, x;
+  double                    largest = PETSC_NINFINITY, x;
   std::vector<CountedAngle> now{{i, j, 0, 0}};
   PetscFunctionBegin;
   for (const auto &b : R.batches)
-    if (b->countedAngle(i, j, &x)) most = std::max(most, x);
-  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE, MPI_MAX, s.comm));
-  if (most > PETSC_NINFINITY) {
+    if (b->countedAngle(i, j, &x)) largest = std::max(largest, x);
+  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, s.comm));
+  if (largest > PETSC_NINFINITY) {
     std::vector<Axes> axes;
     PetscCall(GatherAxes(R, u, now, axes));
-    now[0].angle  = most;
+    now[0].angle  = largest;
     now[0].turned = axes[0][9];
   } else if (s.planar) {
     now[0].angle  = StartAngle(*R.model, Marker{i}, Marker{j});
-    now[0].turned = StartOf(s, i) - StartOf(s, j);
-  } else if (AngleOfMotion(*R.model, t, i, j, &x)) now[0].angle = x;
+    now[0].turned = InitialPlanarAngle(s, i) - InitialPlanarAngle(s, j);
+  } else if (PrescribedAngle(*R.model, t, i, j, &x)) now[0].angle = x;
   PetscCall(CountAngles(R, u, now));
   *first = now[0];
   PetscFunctionReturn(0);
 }
 
-/* Planar bodies, which are described again with an angle in (-pi, pi] */
+/* Copies the full turns of planar bodies' angles: the new description has them in (-pi, pi] */
 static PetscErrorCode CarryPlanarAngles(const Runtime &from, Vec U, const Runtime &to, Vec X)
 {
   const double *u;
@@ -151,17 +151,17 @@ PetscErrorCode CarryAngles(Runtime &from, Vec U, Vec V, Runtime &to, Vec X, Vec 
   const double     *u;
   std::vector<Axes> axes;
   PetscFunctionBegin;
-  to.asked = from.asked;
+  to.queried_angles = from.queried_angles;
   if (to.scene.planar) PetscCall(CarryPlanarAngles(from, U, to, X));
   PetscCall(MoveBodies(from, U, V));
   PetscCall(VecGetArrayRead(U, &u));
-  PetscCall(CountAngles(from, u, to.asked));
+  PetscCall(CountAngles(from, u, to.queried_angles));
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(MoveBodies(to, X, Y));
   PetscCall(VecGetArrayRead(X, &u));
-  PetscCall(GatherAxes(to, u, to.asked, axes));
+  PetscCall(GatherAxes(to, u, to.queried_angles, axes));
   PetscCall(VecRestoreArrayRead(X, &u));
-  for (std::size_t k = 0; k < axes.size(); k++) to.asked[k].turned = axes[k][9];
+  for (std::size_t k = 0; k < axes.size(); k++) to.queried_angles[k].turned = axes[k][9];
   PetscFunctionReturn(0);
 }
 

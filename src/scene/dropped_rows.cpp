@@ -1,7 +1,7 @@
 /*
-  Rows that were dropped as redundant at the start. The others imply them as long as the mechanism is where it was found to be redundant, and
-  dimensions, motions and functions agree; nobody else would notice where one of them is violated later. So they are evaluated once in every
-  accepted step, and after every analysis.
+  Checks rows that were dropped as redundant at the start. They follow from the others only as long as the mechanism stays on the branch of motion on which it was
+  redundant, and dimensions, motions and functions are consistent. So they are evaluated after every accepted step and after every analysis; a violation is
+  an error.
 */
 #include "measures.h"
 #include "runtime.h"
@@ -14,7 +14,7 @@ struct DroppedRows {
   struct Row {
     int    number; /* in StartResult::dropped */
     int    probe, row;
-    double speed = 0; /* at velocity level, the largest so far */
+    double speed = 0; /* rows at velocity level: the largest sum of their terms so far */
   };
   std::vector<std::unique_ptr<Probe>> probes;
   std::vector<bool>                   holonomic;
@@ -25,7 +25,7 @@ struct DroppedRows {
 namespace
 {
 
-/* Angles over full turns and places on curves of rows that are dropped are counted like those of others */
+/* Updates the memories of dropped rows: angles over full turns and points on curves */
 class DroppedBatch : public Batch
 {
 public:
@@ -56,15 +56,15 @@ private:
   std::shared_ptr<DroppedRows> dropped_;
 };
 
-/* The worst of a rank's rows, as a multiple of what is allowed */
+/* The worst row of a rank; ratio: violation relative to the allowed one */
 struct WorstRow {
   double ratio  = 0;
   int    number = -1;
   double violation = 0; /* lengths, radians, their rates */
 };
 
-/* What a row may be violated by: as much as the start, or the errors that the run is allowed, since near a singular position the others imply
-   it no better (DroppedRows.ANetAndBricardsMechanism). unit: the scene's size, a speed, or one for angles */
+/* Allowed violation: by the tolerance of the start or those of the run, since near a singular position the other rows imply a dropped one no
+   better (DroppedRows.ANetAndBricardsMechanism). unit: the scene's size, a speed, or 1 for angles */
 double Allowed(const Runtime &R, double unit) { return std::max(std::max(R.scene.start.tolerance, R.tolerance_of[1]) * unit, R.tolerance_of[0]); }
 
 WorstRow FindWorst(const Runtime &R, const Evaluation &e)

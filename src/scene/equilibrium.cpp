@@ -1,14 +1,14 @@
 /*
   Static equilibrium: Q(q, 0) - Phi_q^T lambda = 0, Phi = 0 with all velocities, accelerations and rates of states zero.
 
-  Implicit Euler steps from rest, one Newton correction each if it is good enough, with velocities set to zero after
-  every step:
+  Pseudo-transient continuation: implicit Euler steps from rest, with velocities set to zero after each, and usually one Newton
+  correction per step:
 
     (M/h^2 + C/h + K) dq + Phi_q^T dlambda = -F,   Phi_q dq = -Phi
 
-  which is the scene's Jacobian with sigma_v = 1/h and sigma_a = 1/h^2. Small steps slide downhill however far from
-  equilibrium, large ones are Newton's method; h grows as the unbalanced forces fall and shrinks where a step would go
-  too far or has gone uphill.
+  which is the scene's Jacobian with sigma_v = 1/h and sigma_a = 1/h^2. Small steps follow the gradient of the potential energy from any
+  position, large ones approach Newton's method; h grows as the unbalanced forces decrease, and shrinks if a step would be
+  too long or the forces have done negative work.
 */
 #include "extension.h"
 #include "start.h"
@@ -24,44 +24,56 @@ namespace
 {
 
 constexpr int    equilibrium_iterations = 2000;
-constexpr double balanced       = 1e-10; /* of forces, times the largest of the scene; of constraints, times its size */
-constexpr double largest_growth = 8;  /* of h in one step */
-constexpr double downhill_growth = 2; /* of h in one step on the way down a hollow */
-constexpr double at_rest = 1e-9;        /* a step that moves no more than this */
-constexpr double noise   = 10;          /* times the forces that rounding of the coordinates makes: no step comes nearer (Equilibrium.AMeshFarFromTheOrigin) */
-constexpr double exhausted = 1e-7;                 /* of the way in the metric of energy: what a last step of a mesh may leave (Beam.test_reactions_to_small_loads) */
-constexpr int    most_finishing = 4;               /* steps more of forces that count as balanced */
-constexpr double slow = 1e-6;                      /* part of a step's velocities at which damping is taken */
-constexpr int    most_corrections = 6;             /* in one step after the first; they end when */
-constexpr double settled = 1e-8;                     /* what states, variables and motions of velocities would still do in the last step, parts of themselves */
-constexpr double state_floor = 1e-6;               /* of states that are zero: their rounding is that of numbers of one */
-constexpr double solved = 0.3, corrected = 0.05;   /* this part of the forces is left, or of the step was the last */
+/* Unbalanced forces relative to the largest force of the scene, and violations of constraints relative to its size, that count as zero */
+constexpr double force_tolerance = 1e-10;
+/* Factors by which h grows at most from one step to the next: in general, and while the forces do less and less work (StepGrowth()) */
+constexpr double max_growth            = 8;
+constexpr double max_growth_converging = 2;
+/* Steps shorter than this, in radians or parts of the scene's size, are accepted without further corrections */
+constexpr double negligible_step_length = 1e-9;
+/* Forces count as zero below this multiple of the forces that rounding of the coordinates causes, which no iteration reduces (Equilibrium.AMeshFarFromTheOrigin) */
+constexpr double rounding_factor = 10;
+/* Distance to equilibrium in the energy norm, relative to the longest step, from which on meshes need further steps although all forces are balanced
+   (test_reactions_to_small_loads of tests/python), and the number of these steps */
+constexpr double remaining_distance  = 1e-7;
+constexpr int    max_finishing_steps = 4;
+/* Part of a step's velocities at which damping is evaluated, StepResidual() */
+constexpr double damping_velocity_factor = 1e-6;
+constexpr int    max_corrections         = 6; /* Newton corrections of a step beyond the first */
+/* Relative changes over the last step of states, variables, force states and motions at velocity level that count as zero; states are compared with at least state_floor, since the
+   rounding of a state that tends to zero is that of terms of order one */
+constexpr double rate_tolerance = 1e-8;
+constexpr double state_floor    = 1e-6;
+/* Corrections of a step end when the forces left in its equations are below residual_reduction of those before the step, or when a correction is shorter than
+   correction_reduction of the step */
+constexpr double residual_reduction = 0.3, correction_reduction = 0.05;
 
 struct Equilibrium : StillSystem {
-  Vec      start = nullptr, undamped = nullptr;
-  double   scale = 0; /* of forces */
-  double   h = 0;     /* of the last step */
-  double   work = 0;  /* most of a step */
-  std::vector<double> most; /* of own unknowns on the way */
+  Vec                 residual_at_start = nullptr, residual_at_rest = nullptr; /* of a step: before it, and after it without velocities; both also serve as work vectors */
+  double              force_scale  = 0;                                        /* largest force so far, moments divided by the scene's size */
+  double              h            = 0;                                        /* step size of the last step, s */
+  double              largest_work = 0;                                        /* largest |work[0]| of a step so far */
+  std::vector<double> largest_value;                                           /* largest magnitude so far of each unknown of this rank */
   PetscInt iterations = 0;
 
   using StillSystem::StillSystem;
   ~Equilibrium()
   {
-    for (Vec *x : {&start, &undamped}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
+    for (Vec *x : {&residual_at_start, &residual_at_rest}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
   }
 };
 
-/* What became of a step: how far it went, and the work over it of the forces that were left before and after it */
-struct Attempt {
+/* good: the step is taken; reach: its length in units of largest_turn; work: of the unbalanced forces before and after the step over its displacements */
+struct StepResult {
   bool   good        = false;
   int    corrections = 0; /* after the first */
   double reach = INFINITY, work[2] = {0, 0};
-  double at_the_states_before = INFINITY; /* the second work, as if states had not changed */
+  double work_at_old_states = INFINITY; /* work[1] with first-order states as before the step */
 };
 
-/* The forces that rounding makes of the coordinates, and of places of bodies, which are held against those of markers (Stops.ALoadOnAStopAnywhere) */
-PetscErrorCode Rounding(Equilibrium &E, double *force)
+/* *force: change of the residual's forces by random relative changes of the unknowns of machine precision. Positions of bodies are changed relative to at least the scene's size, since
+   elements take differences of positions of markers (Stops.ALoadOnAStopAnywhere) */
+PetscErrorCode RoundingForce(Equilibrium &E, double *force)
 {
   Unbalanced    at;
   PetscRandom   random;
@@ -83,16 +95,15 @@ PetscErrorCode Rounding(Equilibrium &E, double *force)
   for (PetscInt i = 0; i < E.R.n; i++) d[i] *= size[i];
   PetscCall(VecRestoreArray(E.d, &d));
   PetscCall(VecWAXPY(E.next, 1, E.d, E.U));
-  PetscCall(Residual(E.R, E.t, E.next, E.zero, E.zero, E.start));
-  PetscCall(VecAXPY(E.start, -1, E.F));
-  PetscCall(E.measure(E.start, at));
+  PetscCall(Residual(E.R, E.t, E.next, E.zero, E.zero, E.residual_at_start));
+  PetscCall(VecAXPY(E.residual_at_start, -1, E.F));
+  PetscCall(E.measure(E.residual_at_start, at));
   *force = at.force;
   PetscFunctionReturn(0);
 }
 
-/* What forces are held against: weights and whatever acts at the start; and a time in which they move things a little
- */
-PetscErrorCode Scales(Equilibrium &E, double *h)
+/* Sets force_scale from weights and the unbalanced forces at the start, and *h, s, to a time in which such a force moves the lightest body by about 1 % of the scene's size */
+PetscErrorCode ChooseScales(Equilibrium &E, double *h)
 {
   const SceneData &s = E.R.scene;
   Unbalanced       at;
@@ -100,19 +111,19 @@ PetscErrorCode Scales(Equilibrium &E, double *h)
   PetscFunctionBegin;
   PetscCall(E.residual(E.U));
   PetscCall(E.measure(E.F, at));
-  E.scale = at.force;
+  E.force_scale = at.force;
   for (const BodyData &b : s.bodies) {
-    E.scale  = std::max(E.scale, b.mass * s.gravity.norm());
+    E.force_scale = std::max(E.force_scale, b.mass * s.gravity.norm());
     if (b.mass > 0 && !b.massless) lightest = std::min(lightest, b.mass);
   }
   if (lightest == INFINITY)
     for (const BodyData &b : s.bodies) lightest = std::min(lightest, b.light_mass);
-  *h = E.scale > 0 && std::isfinite(lightest) ? 0.1 * std::sqrt(E.size * lightest / E.scale) : 1;
+  *h = E.force_scale > 0 && std::isfinite(lightest) ? 0.1 * std::sqrt(E.size * lightest / E.force_scale) : 1;
   PetscFunctionReturn(0);
 }
 
-/* Work of the forces in F over d, on bodies and on what other libraries add: constraints and definitions have none */
-PetscErrorCode Work(const Equilibrium &E, Vec F, Vec d, double *work)
+/* Work of the forces in F over the displacements d of bodies and extensions; other rows are no forces */
+PetscErrorCode WorkOf(const Equilibrium &E, Vec F, Vec d, double *work)
 {
   const Runtime     &R = E.R;
   const PetscScalar *f, *x;
@@ -129,8 +140,7 @@ PetscErrorCode Work(const Equilibrium &E, Vec F, Vec d, double *work)
   PetscFunctionReturn(0);
 }
 
-/* What states that are read have changed is no stiffness: the work of the forces after a step where they are as before, and with them variables and force
-   states, by one correction */
+/* Work of the forces after a step if first-order states had not changed: their effect on forces is no stiffness. Variables and force states follow by one substitution */
 PetscErrorCode WorkAtStatesBefore(Equilibrium &E, double *work)
 {
   const Runtime  &R = E.R;
@@ -142,7 +152,8 @@ PetscErrorCode WorkAtStatesBefore(Equilibrium &E, double *work)
   PetscCall(ISGetSize(R.roles[TSHHT3_STATE], &all));
   if (!all) PetscFunctionReturn(0);
   PetscCall(VecCopy(E.next, E.A));
-  const auto replace = [&](TSHHT3Role role) -> PetscErrorCode { /* states by those of U; others less their rows */
+  /* states by those of U; variables and force states minus their residuals */
+  const auto replace = [&](TSHHT3Role role) -> PetscErrorCode {
     PetscFunctionBegin;
     PetscCall(ISGetLocalSize(R.roles[role], &n));
     PetscCall(ISGetIndices(R.roles[role], &i));
@@ -163,13 +174,13 @@ PetscErrorCode WorkAtStatesBefore(Equilibrium &E, double *work)
   PetscCall(E.residual(E.A));
   for (TSHHT3Role role : {TSHHT3_VARIABLE, TSHHT3_FORCE}) PetscCall(replace(role));
   PetscCall(E.residual(E.A));
-  PetscCall(Work(E, E.F, E.d, work));
+  PetscCall(WorkOf(E, E.F, E.d, work));
   PetscCall(E.residual(E.next));
   PetscFunctionReturn(0);
 }
 
-/* d = J^-1 F, next less d; the reach of d is infinite if there is none */
-PetscErrorCode Newton(Equilibrium &E, double *reach)
+/* d = J^-1 F, next -= d unless d is too long; *reach is infinite if the solve fails */
+PetscErrorCode NewtonCorrection(Equilibrium &E, double *reach)
 {
   KSPConvergedReason reason;
   PetscFunctionBegin;
@@ -183,14 +194,15 @@ PetscErrorCode Newton(Equilibrium &E, double *reach)
   PetscFunctionReturn(0);
 }
 
-/* What rolls does not slip on the way from U to next: the rows of velocities along the straight line, integrated (SceneEquilibrium.AnEccentricWheelRolls) */
-PetscErrorCode RollAlong(Equilibrium &E, double h)
+/* Corrects next so that constraints at velocity level, such as rolling, hold over the straight path from U to next: their integral over the path vanishes
+   (SceneEquilibrium.AnEccentricWheelRolls) */
+PetscErrorCode CorrectRolling(Equilibrium &E, double h)
 {
-  constexpr double at[3] = {0.1127016653792583, 0.5, 0.8872983346207417}, weight[3] = {5. / 18, 8. / 18, 5. / 18}; /* Gauss, Legendre */
+  constexpr double at[3] = {0.1127016653792583, 0.5, 0.8872983346207417}, weight[3] = {5. / 18, 8. / 18, 5. / 18}; /* Gauss-Legendre quadrature on [0, 1] */
   const IS         rows = E.R.roles[TSHHT3_NONHOLONOMIC];
   const PetscInt  *i;
   PetscInt         all, own;
-  double           slip;
+  double           slip_rate;
   PetscFunctionBegin;
   PetscCall(ISGetSize(rows, &all));
   if (!all) PetscFunctionReturn(0);
@@ -198,53 +210,53 @@ PetscErrorCode RollAlong(Equilibrium &E, double h)
   for (int round = 0; round < 30; round++) {
     PetscCall(VecWAXPY(E.V, -1, E.U, E.next));
     PetscCall(VecScale(E.V, 1 / h));
-    PetscCall(VecSet(E.undamped, 0));
+    PetscCall(VecSet(E.residual_at_rest, 0));
     for (int k = 0; k < 3; k++) {
       PetscCall(VecWAXPY(E.A, at[k] * h, E.V, E.U));
       PetscCall(Residual(E.R, E.t, E.A, E.V, E.zero, E.F));
-      PetscCall(VecAXPY(E.undamped, weight[k], E.F));
-      PetscCall(Residual(E.R, E.t, E.A, E.zero, E.zero, E.F)); /* motions of velocities stand still */
-      PetscCall(VecAXPY(E.undamped, -weight[k], E.F));
+      PetscCall(VecAXPY(E.residual_at_rest, weight[k], E.F));
+      PetscCall(Residual(E.R, E.t, E.A, E.zero, E.zero, E.F)); /* without the velocities that motions prescribe */
+      PetscCall(VecAXPY(E.residual_at_rest, -weight[k], E.F));
     }
     const PetscScalar *v;
     PetscScalar       *f;
     PetscCall(VecSet(E.F, 0));
     PetscCall(ISGetIndices(rows, &i));
-    PetscCall(VecGetArrayRead(E.undamped, &v));
+    PetscCall(VecGetArrayRead(E.residual_at_rest, &v));
     PetscCall(VecGetArray(E.F, &f));
     for (PetscInt k = 0; k < own; k++) f[i[k] - E.R.start] = v[i[k] - E.R.start];
     PetscCall(VecRestoreArray(E.F, &f));
-    PetscCall(VecRestoreArrayRead(E.undamped, &v));
+    PetscCall(VecRestoreArrayRead(E.residual_at_rest, &v));
     PetscCall(ISRestoreIndices(rows, &i));
-    PetscCall(VecNorm(E.F, NORM_INFINITY, &slip));
-    if (!(slip * h > 1e-12 * E.size)) break;
+    PetscCall(VecNorm(E.F, NORM_INFINITY, &slip_rate));
+    if (!(slip_rate * h > 1e-12 * E.size)) break;
     PetscCall(KSPSolve(E.ksp, E.F, E.d));
     PetscCall(VecAXPY(E.next, -1, E.d));
   }
   PetscFunctionReturn(0);
 }
 
-/* F: what is left of the equations of the step from U to next. Damping is that of slow motion: dry friction, which saturates, would throw back every
-   step but those of its slip velocity, and does not move equilibrium (SceneEquilibrium.ALeverOnRoughGround). */
+/* F: residual of the equations of the step from U to next. Damping forces are linearized at damping_velocity_factor times the velocities of the step: saturated dry friction would
+   otherwise dominate the residual, although it does not change equilibrium (SceneEquilibrium.ALeverOnRoughGround). */
 PetscErrorCode StepResidual(Equilibrium &E, double h, Unbalanced &left)
 {
   PetscFunctionBegin;
   PetscCall(VecWAXPY(E.A, -1, E.U, E.next));
   PetscCall(VecScale(E.A, 1 / (h * h)));
   PetscCall(VecCopy(E.A, E.V));
-  PetscCall(VecScale(E.V, slow * h));
-  PetscCall(Residual(E.R, E.t, E.next, E.zero, E.A, E.undamped));
+  PetscCall(VecScale(E.V, damping_velocity_factor * h));
+  PetscCall(Residual(E.R, E.t, E.next, E.zero, E.A, E.residual_at_rest));
   PetscCall(Residual(E.R, E.t, E.next, E.V, E.A, E.F));
-  PetscCall(VecAXPBY(E.F, 1 - 1 / slow, 1 / slow, E.undamped));
+  PetscCall(VecAXPBY(E.F, 1 - 1 / damping_velocity_factor, 1 / damping_velocity_factor, E.residual_at_rest));
   PetscCall(E.measure(E.F, left));
   PetscFunctionReturn(0);
 }
 
 /*
-  More corrections where the first has raised the unbalanced forces. It moves thin parts along straight lines, which
-  stretches them: forces that say nothing of how far equilibrium is and would only make h fall.
+  Further corrections if the first has increased the unbalanced forces. A linearized rotation stretches thin flexible parts, and the resulting axial forces
+  would reduce h although equilibrium is nearer.
 */
-PetscErrorCode Correct(Equilibrium &E, double h, double before, Attempt &a, Unbalanced &after)
+PetscErrorCode CorrectStep(Equilibrium &E, double h, double before, StepResult &a, Unbalanced &after)
 {
   double     last = a.reach;
   Unbalanced left;
@@ -253,39 +265,39 @@ PetscErrorCode Correct(Equilibrium &E, double h, double before, Attempt &a, Unba
     PetscCall(E.residual(E.next));
     PetscCall(E.measure(E.F, after));
     if (!std::isfinite(after.force + after.misfit + after.other)) PetscFunctionReturn(0);
-    if (after.force <= before || a.reach * largest_turn <= at_rest || last <= corrected * a.reach) break;
+    if (after.force <= before || a.reach * largest_turn <= negligible_step_length || last <= correction_reduction * a.reach) break;
     PetscCall(StepResidual(E, h, left));
-    if (left.force <= solved * before) break;
-    if (a.corrections == most_corrections) PetscFunctionReturn(0);
+    if (left.force <= residual_reduction * before) break;
+    if (a.corrections == max_corrections) PetscFunctionReturn(0);
     PetscCall(Jacobian(E.R, E.t, E.next, E.zero, E.A, 1 / h, 1 / (h * h), E.J));
-    PetscCall(Newton(E, &last));
+    PetscCall(NewtonCorrection(E, &last));
     if (!(last <= a.reach)) PetscFunctionReturn(0);
   }
   a.good = true;
   PetscFunctionReturn(0);
 }
 
-/* One step from forces before; not good if it would go too far or cannot be computed */
-PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalanced &after)
+/* One step of size h; before: unbalanced force at U. a.good is false if the step would be too long or cannot be computed */
+PetscErrorCode EquilibriumStep(Equilibrium &E, double h, double before, StepResult &a, Unbalanced &after)
 {
   PetscFunctionBegin;
-  a = Attempt();
+  a = StepResult();
   PetscCall(E.residual(E.U));
-  PetscCall(VecCopy(E.F, E.start));
+  PetscCall(VecCopy(E.F, E.residual_at_start));
   PetscCall(Jacobian(E.R, E.t, E.U, E.zero, E.zero, 1 / h, 1 / (h * h), E.J));
   PetscCall(VecCopy(E.U, E.next));
-  PetscCall(Newton(E, &a.reach));
+  PetscCall(NewtonCorrection(E, &a.reach));
   if (!(a.reach <= 1)) PetscFunctionReturn(0);
-  PetscCall(RollAlong(E, h));
-  PetscCall(Correct(E, h, before, a, after));
+  PetscCall(CorrectRolling(E, h));
+  PetscCall(CorrectStep(E, h, before, a, after));
   if (!a.good) PetscFunctionReturn(0);
-  if (a.corrections > 0) PetscCall(RollAlong(E, h));
+  if (a.corrections > 0) PetscCall(CorrectRolling(E, h));
   PetscCall(VecWAXPY(E.d, -1, E.next, E.U));
   PetscCall(E.reach(E.d, &a.reach));
   PetscCall(E.residual(E.next));
-  PetscCall(Work(E, E.start, E.d, &a.work[0]));
-  PetscCall(Work(E, E.F, E.d, &a.work[1]));
-  PetscCall(WorkAtStatesBefore(E, &a.at_the_states_before));
+  PetscCall(WorkOf(E, E.residual_at_start, E.d, &a.work[0]));
+  PetscCall(WorkOf(E, E.F, E.d, &a.work[1]));
+  PetscCall(WorkAtStatesBefore(E, &a.work_at_old_states));
   E.h = h;
   PetscCall(VecCopy(E.next, E.U));
   after.step = a.reach * largest_turn;
@@ -293,23 +305,23 @@ PetscErrorCode Step(Equilibrium &E, double h, double before, Attempt &a, Unbalan
 }
 
 /*
-  Of h: as the forces fall. Where they fall along the step as in a hollow, slowly where damping is strong (SceneEquilibrium.StrongDamping), h need
-  not wait for that, as long as the next step does not go too far: steps go as h^2 at most. Where they rise on the way down, next to a saddle, h stays. A step
-  against the forces has been Newton's towards a saddle. Where states take balanced bodies along, what their change does to the forces is left out, and where
-  no work is done but that of forces that count as balanced, only time goes on (SceneEquilibrium.SlowStates).
+  Factor of the next h. It is the ratio by which the forces have decreased. While their work decreases along the step, as in a minimum of the energy, h grows even if the forces
+  decrease slowly, as under strong damping (SceneEquilibrium.StrongDamping); the length of a step grows at most as h^2. If the work increases, as near a saddle point, h does not grow
+  beyond that ratio. Negative work means that Newton's method converges to a saddle point: h shrinks. The effect of states on the forces is excluded, and a step in which only forces within
+  the tolerance do work counts as converging, since only states still move (SceneEquilibrium.SlowStates).
 */
-double Growth(const Equilibrium &E, const Attempt &a, double before, const Unbalanced &after)
+double StepGrowth(const Equilibrium &E, const StepResult &a, double before, const Unbalanced &after)
 {
-  const double falling = std::min(largest_growth, std::max(0.5, before / std::max(after.force, 1e-300)));
-  const bool   idle    = std::abs(a.work[0]) <= balanced * E.scale * after.step * E.size;
-  if (!idle && a.work[0] < 0) return 0.25;
-  const bool in_hollow = idle || (a.work[1] > 0 && std::min(a.work[1], a.at_the_states_before) < a.work[0]);
-  return std::max(falling, in_hollow ? std::max(1.0, std::min(downhill_growth, 1 / std::sqrt(a.reach))) : 1.0);
+  const double force_decrease = std::min(max_growth, std::max(0.5, before / std::max(after.force, 1e-300)));
+  const bool   does_no_work   = std::abs(a.work[0]) <= force_tolerance * E.force_scale * after.step * E.size;
+  if (!does_no_work && a.work[0] < 0) return 0.25;
+  const bool converging = does_no_work || (a.work[1] > 0 && std::min(a.work[1], a.work_at_old_states) < a.work[0]);
+  return std::max(force_decrease, converging ? std::max(1.0, std::min(max_growth_converging, 1 / std::sqrt(a.reach))) : 1.0);
 }
 
-/* What is left in F of rows that are no forces, each as a part of what it is of: of definitions of the value, of rates of states and of velocities what they
-   would do in the last, longest step, which knows the scene's own time (SceneEquilibrium.SlowStates, SceneEquilibrium.AMotionOfASmallVelocity) */
-PetscErrorCode Unsettled(const Equilibrium &E, Vec F, double *part)
+/* *part: largest relative residual in F of rows other than forces and holonomic constraints. Residuals of variables and force states are divided by their values; rates of states and
+   velocities are first multiplied by h of the last step, which gives the change over it (SceneEquilibrium.SlowStates, SceneEquilibrium.AMotionOfASmallVelocity) */
+PetscErrorCode RateResidual(const Equilibrium &E, Vec F, double *part)
 {
   const Runtime &R = E.R;
   const double  *f;
@@ -323,10 +335,10 @@ PetscErrorCode Unsettled(const Equilibrium &E, Vec F, double *part)
     PetscCall(ISGetIndices(R.roles[role], &i));
     for (PetscInt k = 0; k < n; k++) {
       const PetscInt own  = i[k] - R.start;
-      const double   size = E.most[own];
+      const double   size = E.largest_value[own];
       if (std::binary_search(E.unread.begin(), E.unread.end(), i[k])) continue;
-      const double x = role == TSHHT3_NONHOLONOMIC ? f[own] * E.h / E.size : role == TSHHT3_VARIABLE ? f[own] / std::max(1., size) : role == TSHHT3_FORCE ? f[own] / std::max({1., E.scale, size}) :
-                                                                                                       f[own] * E.h / std::max(state_floor, size);
+      const double x = role == TSHHT3_NONHOLONOMIC ? f[own] * E.h / E.size : role == TSHHT3_VARIABLE ? f[own] / std::max(1., size) : role == TSHHT3_FORCE ? f[own] / std::max({1., E.force_scale, size}) :
+                                                                                                      f[own] * E.h / std::max(state_floor, size);
       mine = std::max(mine, std::isnan(x) ? INFINITY : std::abs(x));
     }
     PetscCall(ISRestoreIndices(R.roles[role], &i));
@@ -336,24 +348,23 @@ PetscErrorCode Unsettled(const Equilibrium &E, Vec F, double *part)
   PetscFunctionReturn(0);
 }
 
-/* Stiff springs and meshes leave rounding that is no small part of the weights: what it makes of the forces where the scene stands is as good as zero.
-   F: what is left at U */
-PetscErrorCode Balanced(Equilibrium &E, const Unbalanced &at, bool *found)
+/* Whether U is in equilibrium; E.F: residual at U. With stiff springs and meshes, rounding of coordinates causes forces beyond the tolerance: these count as zero, too. */
+PetscErrorCode TestEquilibrium(Equilibrium &E, const Unbalanced &at, bool *found)
 {
-  double unsettled, rounded = 0, rounded_rest = 0;
+  double rate_residual, rounding_force = 0, rounding_rate_residual = 0;
   PetscFunctionBegin;
   *found = false;
-  PetscCall(Unsettled(E, E.F, &unsettled));
-  if (at.misfit > balanced * E.size) PetscFunctionReturn(0);
-  if (at.force > balanced * E.scale || unsettled > settled) {
-    PetscCall(Rounding(E, &rounded));
-    PetscCall(Unsettled(E, E.start, &rounded_rest));
+  PetscCall(RateResidual(E, E.F, &rate_residual));
+  if (at.misfit > force_tolerance * E.size) PetscFunctionReturn(0);
+  if (at.force > force_tolerance * E.force_scale || rate_residual > rate_tolerance) {
+    PetscCall(RoundingForce(E, &rounding_force));
+    PetscCall(RateResidual(E, E.residual_at_start, &rounding_rate_residual));
   }
-  *found = at.force <= std::max(balanced * E.scale, noise * rounded) && unsettled <= std::max(settled, noise * rounded_rest);
+  *found = at.force <= std::max(force_tolerance * E.force_scale, rounding_factor * rounding_force) && rate_residual <= std::max(rate_tolerance, rounding_factor * rounding_rate_residual);
   PetscFunctionReturn(0);
 }
 
-/* States without a column in the equations at rest: integrals for later use, of power or of a deviation */
+/* Finds states that no equation at rest reads (their columns are zero), such as an integral of power or of a control deviation */
 PetscErrorCode FindUnread(Equilibrium &E)
 {
   const IS        states = E.R.roles[TSHHT3_STATE];
@@ -375,19 +386,19 @@ PetscErrorCode FindUnread(Equilibrium &E)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode NoteLargest(Equilibrium &E)
+PetscErrorCode UpdateLargestValues(Equilibrium &E)
 {
   const double *u;
   PetscFunctionBegin;
-  E.most.resize(E.R.n);
+  E.largest_value.resize(E.R.n);
   PetscCall(VecGetArrayRead(E.U, &u));
-  for (PetscInt i = 0; i < E.R.n; i++) E.most[i] = std::max(E.most[i], std::abs(u[i]));
+  for (PetscInt i = 0; i < E.R.n; i++) E.largest_value[i] = std::max(E.largest_value[i], std::abs(u[i]));
   PetscCall(VecRestoreArrayRead(E.U, &u));
   PetscFunctionReturn(0);
 }
 
-/* These as they were in `begin` */
-PetscErrorCode KeepUnread(Equilibrium &E, Vec begin)
+/* Resets the unread states to their values in `begin` */
+PetscErrorCode RestoreUnread(Equilibrium &E, Vec begin)
 {
   const double *before;
   double       *now;
@@ -400,44 +411,44 @@ PetscErrorCode KeepUnread(Equilibrium &E, Vec begin)
   PetscFunctionReturn(0);
 }
 
-/* Of a mesh forces may be small at every node, below what rounding makes there, and still add up, as those of inertia do after a step that was not yet Newton's. What is
-   left of the way is w_1/sqrt(w_0 w) by the work of the forces after and before this step, and of those before the longest one. Steps that grow are drift of rounding where nothing
-   holds the body. */
-bool Unfinished(Equilibrium &E, const Attempt &a, double reach_before)
+/* Whether a mesh needs a further step although its forces are balanced: they may be within rounding at every node and still sum up to a load, as inertia forces of a step with finite h.
+   The distance to equilibrium relative to the longest step is estimated as |w_1|/sqrt(w_0 w), from the work w_1 of the forces after and w_0 before this step, and w before the longest.
+   Growing steps are drift by rounding of a body that nothing holds. */
+bool NeedsFinishing(Equilibrium &E, const StepResult &a, double reach_before)
 {
   if (E.R.scene.extensions.empty()) return false;
-  return std::abs(a.work[1]) > exhausted * std::sqrt(std::abs(a.work[0]) * E.work) && a.reach < 4 * reach_before;
+  return std::abs(a.work[1]) > remaining_distance * std::sqrt(std::abs(a.work[0]) * E.largest_work) && a.reach < 4 * reach_before;
 }
 
-PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
+PetscErrorCode StepToEquilibrium(Equilibrium &E, bool *found, Unbalanced &at)
 {
   double  h = 0, first, before, reach = INFINITY;
   int     finishing = 0;
-  Attempt a;
+  StepResult a;
   PetscFunctionBegin;
-  PetscCall(Scales(E, &h));
-  PetscCall(NoteLargest(E));
+  PetscCall(ChooseScales(E, &h));
+  PetscCall(UpdateLargestValues(E));
   first  = h;
-  before = at.force = E.scale;
+  before = at.force = E.force_scale;
   *found = false;
   while (E.iterations < equilibrium_iterations && !*found && h > 1e-12 * first) {
-    PetscCall(Step(E, h, before, a, at));
+    PetscCall(EquilibriumStep(E, h, before, a, at));
     PetscCall(PetscInfo(nullptr, "scene: equilibrium %d: h = %g%s, unbalanced %g of %g, constraints %g, step %g with %d corrections more\n",
-                        (int)E.iterations, h, a.good ? "" : " refused", at.force, E.scale, at.misfit, a.reach * largest_turn,
+                        (int)E.iterations, h, a.good ? "" : " refused", at.force, E.force_scale, at.misfit, a.reach * largest_turn,
                         a.corrections));
     if (!a.good) {
       h /= 4;
       continue;
     }
-    PetscCall(NoteLargest(E));
-    E.scale = std::max(E.scale, at.force); /* variables that carry loads may begin at zero (SceneEquilibrium.ALoopThroughAVariable) */
-    PetscCall(Balanced(E, at, found));
-    E.work = std::max(E.work, std::abs(a.work[0]));
-    if (*found && finishing < most_finishing && Unfinished(E, a, reach)) {
+    PetscCall(UpdateLargestValues(E));
+    E.force_scale = std::max(E.force_scale, at.force); /* loads through variables may be zero at first (SceneEquilibrium.ALoopThroughAVariable) */
+    PetscCall(TestEquilibrium(E, at, found));
+    E.largest_work = std::max(E.largest_work, std::abs(a.work[0]));
+    if (*found && finishing < max_finishing_steps && NeedsFinishing(E, a, reach)) {
       *found = false;
       finishing++;
-      h *= largest_growth;
-    } else h *= Growth(E, a, before, at);
+      h *= max_growth;
+    } else h *= StepGrowth(E, a, before, at);
     before = at.force;
     reach  = a.reach;
     PetscCall(Remember(E.R, E.U, E.zero));
@@ -446,13 +457,13 @@ PetscErrorCode Relax(Equilibrium &E, bool *found, Unbalanced &at)
   PetscFunctionReturn(0);
 }
 
-/* A column that is zero at the start may be that of a factor that is: x of the stiffness x at no displacement (SceneEquilibrium.AStateThatIsAFactor). States
-   stay as they were in `begin` where nothing reads them at the end either, and the end is balanced with them so. */
-PetscErrorCode RelaxAndKeep(Equilibrium &E, Vec begin, bool *found, Unbalanced &at)
+/* A state that scales a force which is zero at the start, as a stiffness at zero displacement, has a zero column there and is read nevertheless (SceneEquilibrium.AStateThatIsAFactor).
+   So states are reset to their values in `begin` only if no equation reads them at the end either, and equilibrium is tested again with these values. */
+PetscErrorCode FindEquilibriumState(Equilibrium &E, Vec begin, bool *found, Unbalanced &at)
 {
   PetscFunctionBegin;
   PetscCall(FindUnread(E));
-  PetscCall(Relax(E, found, at));
+  PetscCall(StepToEquilibrium(E, found, at));
   while (*found) {
     const std::vector<PetscInt> before = E.unread;
     const PetscInt              own    = (PetscInt)before.size();
@@ -464,21 +475,21 @@ PetscErrorCode RelaxAndKeep(Equilibrium &E, Vec begin, bool *found, Unbalanced &
     std::set_intersection(before.begin(), before.end(), E.unread.begin(), E.unread.end(), std::back_inserter(both));
     E.unread = both;
     PetscCall(VecCopy(E.U, E.A));
-    PetscCall(KeepUnread(E, begin));
+    PetscCall(RestoreUnread(E, begin));
     PetscCall(E.residual(E.U));
     PetscCall(E.measure(E.F, at));
-    PetscCall(Balanced(E, at, found));
+    PetscCall(TestEquilibrium(E, at, found));
     if (*found) PetscFunctionReturn(0);
     PetscCall(VecCopy(E.A, E.U));
     E.unread.clear();
-    PetscCall(Relax(E, found, at));
+    PetscCall(StepToEquilibrium(E, found, at));
   }
   PetscFunctionReturn(0);
 }
 
 } // namespace
 
-/* U: where it begins and ends; of no use after an error */
+/* U: start and result; undefined after an error */
 PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
 {
   Equilibrium E(R, t);
@@ -486,9 +497,9 @@ PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
   bool        found = false;
   PetscFunctionBegin;
   PetscCall(E.create(U, "scene_equilibrium_"));
-  PetscCall(VecDuplicate(U, &E.start));
-  PetscCall(VecDuplicate(U, &E.undamped));
-  PetscCall(RelaxAndKeep(E, U, &found, at));
+  PetscCall(VecDuplicate(U, &E.residual_at_start));
+  PetscCall(VecDuplicate(U, &E.residual_at_rest));
+  PetscCall(FindEquilibriumState(E, U, &found, at));
   PetscCheck(found, R.scene.comm, PETSC_ERR_CONV_FAILED,
              "no static equilibrium found in %d corrections: a force of %g (moments over the scene's size) is left on %s, "
              "constraints are violated by %g, motions of velocities, rates of states and definitions by %g.\n"
@@ -506,8 +517,8 @@ static PetscErrorCode MoveToEquilibrium(Model &M, Runtime &R, Vec U, Vec V)
   PetscFunctionBegin;
   PetscCall(InitialState(R, U, V));
   PetscCall(RelaxAt(R, s.start.time, U, &s.started.equilibrium_iterations));
-  M.turned.resize(Memories(R)); /* the run begins with the turns made on the way (SceneEquilibrium.TurnsOnTheWay) */
-  CopyMemories(R, M.turned.data(), false);
+  M.start_memories.resize(Memories(R)); /* full turns of angles on the way count (SceneEquilibrium.TurnsOnTheWay) */
+  CopyMemories(R, M.start_memories.data(), false);
   PetscCall(WriteState(M, R, U, nullptr));
   PetscCall(ReportMoves(s, before, "equilibrium"));
   PetscFunctionReturn(0);

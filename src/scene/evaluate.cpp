@@ -1,4 +1,4 @@
-/* Residual and Jacobian of the scene: exchange, motion of the bodies, elements, bodies' own rows. */
+/* Residual and Jacobian of the scene: exchange between ranks, motion of the bodies, elements, then the bodies' own rows. */
 #include "guard.h"
 #include "runtime.h"
 #include <algorithm>
@@ -6,7 +6,7 @@
 namespace hhtdae
 {
 
-/* The local unknowns: the arrays themselves on one rank, else copies with others' values behind */
+/* Local unknowns: on one rank the arrays themselves, else copies of own values followed by those of other ranks */
 PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const double *a, const double *local[3])
 {
   const double *own[3] = {u, v, a};
@@ -28,7 +28,7 @@ PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const do
   PetscFunctionReturn(0);
 }
 
-/* V: at the beginning of the step whose matrix is to be made */
+/* V: velocities at the beginning of the step whose matrix is computed next */
 PetscErrorCode NoteBeginning(Runtime &R, Vec V)
 {
   const double *v, *local[3];
@@ -45,14 +45,14 @@ PetscErrorCode NoteBeginning(Runtime &R, Vec V)
 
 PetscErrorCode LocalMotion(Runtime &R, const double *u, const double *v, const double *a, std::vector<double> &room, const double *local[3])
 {
-  const bool apart = R.size > 1 && !R.uses_acceleration;
+  const bool exchange_apart = R.size > 1 && !R.uses_acceleration;
   PetscFunctionBegin;
-  if (apart) {
+  if (exchange_apart) {
     PetscCall(LocalState(R, a, a, a, local));
     room.assign(local[0], local[0] + R.u.size());
   }
   PetscCall(LocalState(R, u, v, a, local));
-  if (apart) local[2] = room.data();
+  if (exchange_apart) local[2] = room.data();
   PetscFunctionReturn(0);
 }
 
@@ -125,7 +125,7 @@ void AddAll(Runtime &R, Evaluation &e)
   BodyBlocks(R, e);
 }
 
-/* The arrays of SEQAIJ and MPIAIJ are filled in place; another type gets the rows of an AIJ copy. */
+/* SEQAIJ and MPIAIJ are filled in place; other types are converted from the AIJ matrix R.J */
 PetscErrorCode Fill(Runtime &R, Evaluation &e, Mat aij)
 {
   Mat       diagonal = aij, off = nullptr;
@@ -186,7 +186,7 @@ PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, do
 Runtime::~Runtime()
 {
   PetscBool gone = PETSC_FALSE;
-  if (PetscFinalized(&gone) || gone) return; /* PETSc has taken everything with it */
+  if (PetscFinalized(&gone) || gone) return; /* PetscFinalize() has been called */
   for (IS &is : roles) PetscCallAbort(PETSC_COMM_SELF, ISDestroy(&is));
   PetscCallAbort(PETSC_COMM_SELF, MatDestroy(&J));
   PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&axes));

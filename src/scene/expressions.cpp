@@ -183,7 +183,7 @@ std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
   PetscInt rows = 0, row = m.component;
   for (const Part &p : e.parts) {
     if (p.store->isConstraint() == of_load) continue;
-    if (in_equation && of_load && row >= 0 && row < p.store->rows() && !p.store->carried(p.index))
+    if (in_equation && of_load && row >= 0 && row < p.store->rows() && !p.store->asForceStates(p.index))
       return who + " is eliminated; an expression needs its components as force states: set state = true on it";
     rows += p.store->rows();
     row -= p.store->rows();

@@ -1,7 +1,6 @@
 /*
-  Bodies and movements without inertia. The equations of motion have a solution where masses are positive on all movements that the
-  constraints allow: so what has no inertia has to follow from the constraints, Phi_q N of full column rank for the movements N
-  without inertia.
+  Bodies and movements without inertia. The equations of motion are solvable if the mass matrix is positive definite on the movements that the
+  constraints allow. So the constraints have to determine movements N without inertia: Phi_q N must have full column rank.
 */
 #include "products.h"
 #include "start.h"
@@ -16,19 +15,19 @@ namespace hhtdae
 namespace
 {
 
-constexpr double none        = 1e-12; /* of the other moments of a body: no inertia */
-constexpr double light       = 1e-3;  /* what assembly takes in its place, of others */
-constexpr double least       = 1e-7;  /* of the largest: to assembly nothing is lighter (Massless.NextToNothing) */
-constexpr double independent = 1e-8;  /* columns of norm one */
+constexpr double zero_moment_ratio = 1e-12; /* principal moments below this part of the body's largest one count as zero */
+constexpr double light_mass_ratio  = 1e-3;  /* substitute for missing inertia in the metric of assembly, relative to the lightest body's or the body's own */
+constexpr double least_mass_ratio  = 1e-7;  /* least inertia in the metric of assembly, relative to the largest one (Massless.NextToNothing) */
+constexpr double rank_tolerance    = 1e-8;  /* pivot threshold of the rank of Phi_q N, whose columns have norm one */
 
-/* Axes of a body, as columns in body axes, about which turning has no inertia */
-Eigen::MatrixXd TurnsWithout(const SceneData &s, const BodyData &b)
+/* Axes, as columns in body axes, about which the body has no moment of inertia */
+Eigen::MatrixXd AxesWithoutInertia(const SceneData &s, const BodyData &b)
 {
   if (b.point) return Eigen::MatrixXd(3, 0);
   if (s.planar) return b.inertia(2, 2) > 0 ? Eigen::MatrixXd(3, 0) : Eigen::MatrixXd(Vector3::UnitZ());
   const SymmetricEigen principal(b.inertia);
   int                  n = 0;
-  while (n < 3 && principal.values(n) <= none * principal.values(2)) n++;
+  while (n < 3 && principal.values(n) <= zero_moment_ratio * principal.values(2)) n++;
   return principal.vectors.leftCols(n);
 }
 
@@ -38,24 +37,24 @@ double LeastMoment(const SceneData &s, const BodyData &b)
   return SymmetricEigen(b.inertia).values(0);
 }
 
-bool HasAll(const SceneData &s, const BodyData &b) { return b.massless || b.flexible || (b.mass > 0 && TurnsWithout(s, b).cols() == 0); }
+bool HasFullInertia(const SceneData &s, const BodyData &b) { return b.massless || b.flexible || (b.mass > 0 && AxesWithoutInertia(s, b).cols() == 0); }
 
-/* Movements of a body that have no inertia, in its directions of motion */
-Eigen::MatrixXd Without(const SceneData &s, const BodyData &b)
+/* Movements of a body that have no inertia, as columns in its directions of motion */
+Eigen::MatrixXd MovementsWithoutInertia(const SceneData &s, const BodyData &b)
 {
   const std::vector<int> &d     = Directions(KindOf(s, b));
-  const Eigen::MatrixXd   turns = b.A * TurnsWithout(s, b);
-  const int               ways  = b.mass > 0 ? 0 : s.planar ? 2 : 3;
-  Eigen::MatrixXd         full  = Eigen::MatrixXd::Zero(6, ways + turns.cols()), N(d.size(), full.cols());
-  for (int k = 0; k < ways; k++) full(k, k) = 1;
-  full.bottomRightCorner(3, turns.cols()) = turns;
+  const Eigen::MatrixXd   axes         = b.A * AxesWithoutInertia(s, b);
+  const int               translations = b.mass > 0 ? 0 : s.planar ? 2 : 3;
+  Eigen::MatrixXd         full         = Eigen::MatrixXd::Zero(6, translations + axes.cols()), N(d.size(), full.cols());
+  for (int k = 0; k < translations; k++) full(k, k) = 1;
+  full.bottomRightCorner(3, axes.cols()) = axes;
   for (std::size_t i = 0; i < d.size(); i++) N.row((Eigen::Index)i) = full.row(d[i]);
   return N;
 }
 
 } // namespace
 
-/* A little of the inertia of others, as the metric of assembly, whose equations lose what joins two heavy bodies by one that is far lighter */
+/* Sets the least inertia of each body in the metric of assembly: with a body far lighter than its neighbours, Phi_q M^-1 Phi_q^T would lose the coupling of these to rounding */
 void FillLight(SceneData &s)
 {
   double lightest = INFINITY, heaviest = 0, moment = 0;
@@ -65,32 +64,32 @@ void FillLight(SceneData &s)
     if (!b.point) moment = std::max(moment, s.planar ? b.inertia(2, 2) : b.inertia.norm());
   }
   for (BodyData &b : s.bodies) {
-    if (HasAll(s, b)) {
-      if (b.mass < least * heaviest) b.light_mass = std::max(b.light_mass, least * heaviest);
-      if (!b.point && LeastMoment(s, b) < least * moment) b.light_inertia = std::max(b.light_inertia, least * moment);
+    if (HasFullInertia(s, b)) {
+      if (b.mass < least_mass_ratio * heaviest) b.light_mass = std::max(b.light_mass, least_mass_ratio * heaviest);
+      if (!b.point && LeastMoment(s, b) < least_mass_ratio * moment) b.light_inertia = std::max(b.light_inertia, least_mass_ratio * moment);
       continue;
     }
     const double size = SceneSize(s);
-    b.light_mass      = std::isfinite(lightest) ? light * lightest : 1;
-    b.light_inertia   = std::max(light * (s.planar ? b.inertia(2, 2) : b.inertia.norm()), light * (b.mass > 0 ? b.mass : b.light_mass) * (size > 0 ? size * size : 1));
+    b.light_mass      = std::isfinite(lightest) ? light_mass_ratio * lightest : 1;
+    b.light_inertia   = std::max(light_mass_ratio * (s.planar ? b.inertia(2, 2) : b.inertia.norm()), light_mass_ratio * (b.mass > 0 ? b.mass : b.light_mass) * (size > 0 ? size * size : 1));
   }
 }
 
 PetscErrorCode CheckInertia(const SceneData &s)
 {
-  std::vector<PetscInt>               first(s.bodies.size(), -1), of; /* columns of bodies, bodies of columns */
+  std::vector<PetscInt>               first(s.bodies.size(), -1), of; /* first column of each body; body of each column */
   std::vector<Eigen::Triplet<double>> entries;
   std::vector<Eigen::MatrixXd>        N(s.bodies.size());
   PetscFunctionBegin;
   for (std::size_t b = 0; b < s.bodies.size(); b++) {
-    if (HasAll(s, s.bodies[b])) continue;
-    N[b]     = Without(s, s.bodies[b]);
+    if (HasFullInertia(s, s.bodies[b])) continue;
+    N[b]     = MovementsWithoutInertia(s, s.bodies[b]);
     first[b] = (PetscInt)of.size();
     of.insert(of.end(), N[b].cols(), (PetscInt)b);
   }
   if (of.empty()) PetscFunctionReturn(0);
   int row = 0;
-  for (const RowBlock &block : DescribeAll(s, s.start.time, Hold::None)) {
+  for (const RowBlock &block : DescribeAll(s, s.start.time, FixedBodies::None)) {
     for (std::size_t k = 0; k < block.body.size(); k++) {
       const PetscInt b = block.body[k];
       if (first[b] < 0) continue;
@@ -107,7 +106,7 @@ PetscErrorCode CheckInertia(const SceneData &s)
     if (A.col(c).norm() > 0) A.col(c) /= A.col(c).norm();
   A.makeCompressed();
   Eigen::SparseQR<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>> qr;
-  qr.setPivotThreshold(independent);
+  qr.setPivotThreshold(rank_tolerance);
   qr.compute(A);
   if (qr.rank() == A.cols()) PetscFunctionReturn(0);
   const BodyData &b = s.bodies[of[qr.colsPermutation().indices()(qr.rank())]];

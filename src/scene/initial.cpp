@@ -1,4 +1,4 @@
-/* The state that the description gives. */
+/* The described state as unknowns of a run. */
 #include "extension.h"
 #include "runtime.h"
 
@@ -8,7 +8,7 @@ namespace hhtdae
 namespace
 {
 
-void Start(const Runtime &R, const LocalBody &k, double *U, double *V)
+void SetInitialState(const Runtime &R, const LocalBody &k, double *U, double *V)
 {
   if (k.kind == BodyKind::Attached) return;
   const BodyData &b = R.scene.bodies[k.id];
@@ -23,7 +23,7 @@ void Start(const Runtime &R, const LocalBody &k, double *U, double *V)
     v[2] = b.w(2);
   }
   if (!TurnsInSpace(k.kind)) return;
-  Vector3 angles = Vector3::Zero(), rate = b.w; /* local: the reference is the initial attitude */
+  Vector3 angles = Vector3::Zero(), rate = b.w; /* local rotation vectors are zero: their reference is the initial attitude */
   if (!R.bodies.local) {
     Matrix3   A;
     EulerAxes e;
@@ -52,7 +52,7 @@ PetscErrorCode InitialState(Runtime &R, Vec U, Vec V)
   PetscCall(VecGetArray(V, &v));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
-    Start(R, k, u, v);
+    SetInitialState(R, k, u, v);
   }
   for (std::size_t i = 0; i < R.number.variable.size(); i++)
     if (R.number.variable_owner[i] == R.rank) u[R.number.variable[i] - R.start] = R.scene.variables[i].initial;

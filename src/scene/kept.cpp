@@ -1,6 +1,6 @@
 /*
-  The end of the vector that checkpoints keep of a scene, the same on every rank: values of parameters, a digest of the description, and where the
-  recording of results stands, so that a run which is resumed goes on in the same files.
+  The last entries of the checkpoint vector of a scene (Runtime::axes), the same on every rank: values of parameters, a digest of the description, and the state
+  of the recorder, so that a resumed run continues the same files. Also compares descriptions between ranks by digests.
 */
 #include "runtime.h"
 #include "start.h"
@@ -15,18 +15,18 @@ namespace hhtdae
 namespace
 {
 
-static_assert(kept >= recorded + 3, "room for the digest, the recording, and whether parameters have changed");
+static_assert(checkpoint_numbers >= recorder_numbers + 3, "room for the digest, the recording, and whether parameters have changed");
 
-/* FNV-1a over what is given, numbers in single precision: other machines and compilers round differently */
+/* FNV-1a hash; numbers are rounded to single precision, since machines and compilers differ in rounding */
 class Digest
 {
 public:
   void text(const std::string &x)
   {
     bytes(x.data(), x.size());
-    whole((long)x.size());
+    integer((long)x.size());
   }
-  void whole(long x) { bytes(&x, sizeof x); }
+  void integer(long x) { bytes(&x, sizeof x); }
   void number(double x)
   {
     const float f = std::abs(x) < 1e-30 ? 0.f : (float)x;
@@ -36,7 +36,7 @@ public:
   {
     for (Eigen::Index i = 0; i < m.size(); i++) number(m.data()[i]);
   }
-  /* as two numbers that a vector holds exactly */
+  /* as two integers that doubles represent exactly */
   void put(double x[2]) const
   {
     x[0] = (double)(sum_ >> 32);
@@ -51,59 +51,59 @@ private:
   }
 };
 
-void Add(Digest &d, const BodyData &b)
+void AddToDigest(Digest &d, const BodyData &b)
 {
-  d.whole(b.point + 2 * b.massless + 4 * (b.flexible != nullptr));
-  d.whole(b.carrier);
-  d.whole(b.attachment);
+  d.integer(b.point + 2 * b.massless + 4 * (b.flexible != nullptr));
+  d.integer(b.carrier);
+  d.integer(b.attachment);
   d.number(b.mass);
   if (!b.point) d.numbers(b.inertia);
   d.numbers(b.center);
   if (!b.flexible) return;
-  d.whole(b.flexible->model->modes());
+  d.integer(b.flexible->model->modes());
   for (const double x : b.flexible->damping) d.number(x);
 }
 
-void Add(Digest &d, const StoreBase &s)
+void AddToDigest(Digest &d, const StoreBase &s)
 {
-  d.whole(s.isConstraint());
+  d.integer(s.isConstraint());
   for (PetscInt e = 0; e < s.size(); e++) {
-    d.whole(s.element(e));
-    d.whole(s.active(e) + 256 * s.carried(e));
-    for (int k = 0; k < s.markers(); k++) d.whole(s.marker(e, k));
+    d.integer(s.element(e));
+    d.integer(s.active(e) + 256 * s.asForceStates(e));
+    for (int k = 0; k < s.markers(); k++) d.integer(s.marker(e, k));
     for (int i = 0; i < s.inputs(); i++) {
       const ScalarRef r = s.input(e, i);
-      d.whole(r.kind + 8 * r.component);
-      d.whole(r.id);
+      d.integer(r.kind + 8 * r.component);
+      d.integer(r.id);
     }
   }
 }
 
-/* What of the description is plain to see. Stiffnesses and users' functions are not among it: the residual tells them. */
+/* Digest of bodies, markers and the structure of elements; without stiffnesses and users' functions, which may be changed in a resumed run */
 Digest MakeDigest(const SceneData &s)
 {
   Digest d;
-  d.whole(s.planar + 2 * (int)s.start.rotations);
+  d.integer(s.planar + 2 * (int)s.start.rotations);
   d.numbers(s.gravity);
-  d.whole((long)s.ground_acceleration.size());
-  for (const BodyData &b : s.bodies) Add(d, b);
+  d.integer((long)s.ground_acceleration.size());
+  for (const BodyData &b : s.bodies) AddToDigest(d, b);
   for (std::size_t k = 0; k < s.ownMarkers(); k++) {
     const MarkerData &m = s.markers[k];
-    d.whole(m.body);
+    d.integer(m.body);
     d.numbers(m.s);
     d.numbers(m.R);
   }
   for (const ElementData &e : s.elements) {
     d.text(e.type);
-    d.whole(e.i.id);
-    d.whole(e.j.id);
+    d.integer(e.i.id);
+    d.integer(e.j.id);
   }
-  for (const StoreBase *store : s.order) Add(d, *store);
-  for (const auto *unknowns : {&s.variables, &s.states}) d.whole((long)unknowns->size());
+  for (const StoreBase *store : s.order) AddToDigest(d, *store);
+  for (const auto *unknowns : {&s.variables, &s.states}) d.integer((long)unknowns->size());
   return d;
 }
 
-/* What ranks have to agree in, section by section: a digest of the description as checkpoints have it, and what these need not know */
+/* Sections of a description that must be the same on all ranks: the digest of checkpoints, and further ones */
 struct Section {
   const char *name;
   Digest      digest;
@@ -114,7 +114,7 @@ std::vector<Section> SectionsOf(const SceneData &s)
   std::vector<Section> all(6);
   all[0].name = "bodies, markers, gravity, elements and what they connect";
   all[0].digest = MakeDigest(s);
-  all[0].digest.whole((long)s.errors.size());
+  all[0].digest.integer((long)s.errors.size());
   all[1].name = "positions and velocities of bodies at the start";
   for (const BodyData &b : s.bodies) {
     all[1].digest.numbers(b.r);
@@ -133,7 +133,7 @@ std::vector<Section> SectionsOf(const SceneData &s)
   all[4].name = "channels";
   for (const ChannelData &c : s.channels) {
     all[4].digest.text(c.name);
-    for (const Measure &m : c.value.arguments) all[4].digest.whole((long)m.kind);
+    for (const Measure &m : c.value.arguments) all[4].digest.integer((long)m.kind);
   }
   all[5].name = "variables, states and how runs start";
   for (const auto *unknowns : {&s.variables, &s.states})
@@ -146,24 +146,24 @@ std::vector<Section> SectionsOf(const SceneData &s)
 }
 
 /* "rank 1", "ranks 1, 2, 5 and 7 more" */
-std::string Ranks(const std::vector<PetscMPIInt> &r)
+std::string RankList(const std::vector<PetscMPIInt> &r)
 {
-  constexpr std::size_t most = 5;
+  constexpr std::size_t max_named = 5;
   std::string           text = r.size() > 1 ? "ranks " : "rank ";
-  for (std::size_t k = 0; k < std::min(most, r.size()); k++) text += (k ? ", " : "") + std::to_string(r[k]);
-  return r.size() > most ? text + " and " + std::to_string(r.size() - most) + " more" : text;
+  for (std::size_t k = 0; k < std::min(max_named, r.size()); k++) text += (k ? ", " : "") + std::to_string(r[k]);
+  return r.size() > max_named ? text + " and " + std::to_string(r.size() - max_named) + " more" : text;
 }
 
-/* The value of a checkpoint, to so many digits */
-bool Same(double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(a); }
+/* Whether a value agrees with that of a checkpoint up to rounding */
+bool AgreesWithCheckpoint(double a, double b) { return std::abs(a - b) <= 1e-12 * std::abs(a); }
 
 PetscErrorCode CheckParameters(const SceneData &s, const double *x)
 {
   PetscFunctionBegin;
   for (const ParameterData &p : s.parameters) {
-    PetscCheck(Same(x[0], p.described), s.comm, PETSC_ERR_FILE_UNEXPECTED,
+    PetscCheck(AgreesWithCheckpoint(x[0], p.described), s.comm, PETSC_ERR_FILE_UNEXPECTED,
                "The checkpoint is of a run with parameter %s = %.15g, this one was made with %.15g: Scene::set() it before the run is made", p.name.c_str(), x[0], p.described);
-    PetscCheck(Same(x[1], *p.present), s.comm, PETSC_ERR_FILE_UNEXPECTED,
+    PetscCheck(AgreesWithCheckpoint(x[1], *p.present), s.comm, PETSC_ERR_FILE_UNEXPECTED,
                "When the checkpoint was written, parameter %s was %.15g, now it is %.15g: Scene::set() it before the checkpoint is read, and to another value after that", p.name.c_str(), x[1], *p.present);
     x += 2;
   }
@@ -185,7 +185,7 @@ PetscErrorCode CompareDescriptions(const SceneData &s, PetscMPIInt size)
     std::vector<PetscMPIInt> others;
     for (PetscMPIInt r = 1; r < size; r++)
       if (all[n * r + 2 * k] != all[2 * k] || all[n * r + 2 * k + 1] != all[2 * k + 1]) others.push_back(r);
-    if (!others.empty()) differences += std::string("\n  ") + sections[k].name + ": " + Ranks(others);
+    if (!others.empty()) differences += std::string("\n  ") + sections[k].name + ": " + RankList(others);
   }
   PetscCheck(differences.empty(), s.comm, PETSC_ERR_ARG_NOTSAMETYPE,
              "ranks describe different scenes; on these ranks it is another one than on rank 0:%s\nEvery rank has to make the same calls in the same order, with the same numbers", differences.c_str());
@@ -212,7 +212,7 @@ PetscErrorCode CheckSame(const Runtime &R, TS ts)
   PetscFunctionReturn(0);
 }
 
-PetscInt Kept(const Runtime &R) { return 2 * (PetscInt)R.scene.parameters.size() + kept; }
+PetscInt Kept(const Runtime &R) { return 2 * (PetscInt)R.scene.parameters.size() + checkpoint_numbers; }
 
 PetscErrorCode WriteKept(Runtime &R)
 {
@@ -226,10 +226,10 @@ PetscErrorCode WriteKept(Runtime &R)
     *end++ = p.described;
     *end++ = *p.present;
   }
-  std::fill(end, end + kept, 0.0);
+  std::fill(end, end + checkpoint_numbers, 0.0);
   MakeDigest(R.scene).put(end);
   PetscCall(SaveOutput(R, end + 2));
-  end[kept - 1] = !R.step_parameters.empty() && R.step_parameters != ParametersNow(R.scene);
+  end[checkpoint_numbers - 1] = !R.step_parameters.empty() && R.step_parameters != ParametersNow(R.scene);
   PetscCall(VecRestoreArray(R.axes, &x));
   PetscFunctionReturn(0);
 }
@@ -238,14 +238,14 @@ PetscErrorCode ReadKept(Runtime &R, const double *x)
 {
   double digest[2];
   PetscFunctionBegin;
-  PetscCall(CheckParameters(R.scene, x)); /* whose values masses and places may depend on */
-  x += Kept(R) - kept;
+  PetscCall(CheckParameters(R.scene, x)); /* before the digest, since masses and positions may depend on parameters */
+  x += Kept(R) - checkpoint_numbers;
   MakeDigest(R.scene).put(digest);
   PetscCheck(digest[0] == x[0] && digest[1] == x[1], R.scene.comm, PETSC_ERR_FILE_UNEXPECTED,
              "The checkpoint belongs to another scene: bodies, markers, gravity or the elements and what they connect are not the same");
   PetscCall(ResumeOutput(R, x + 2));
   R.step_parameters = ParametersNow(R.scene);
-  if (x[kept - 1] != 0) R.step_parameters.clear(); /* set since the last step */
+  if (x[checkpoint_numbers - 1] != 0) R.step_parameters.clear(); /* a parameter had been changed since the last step */
   PetscFunctionReturn(0);
 }
 

@@ -12,7 +12,7 @@
       template <class T> static void value(const Data &, const Frame<T> *f, const T &t, T *phi);
     };
 
-  gets gradient and curvature by automatic differentiation from Constraint<>; a hot kernel hides them by its own:
+  gets gradient and curvature by automatic differentiation from Constraint<>; kernels for which speed matters define their own:
 
       static void gradient(const Data &, const Frame<double> *f, double t, Matrix<rows, 6*markers> &J);    J = dPhi/d(x_0, theta_0, x_1, ...)
       static void curvature(const Data &, const Frame<double> *f, double t, const double *lambda, Matrix<6*markers, 6*markers> &H);
@@ -23,7 +23,7 @@
 
   A velocity-level (non-holonomic) constraint Psi(frames, twists, t) = 0, linear in the twists: derive from VelocityConstraint<>,
   value() takes the twists after the frames,
-  and after t the scalars z where it has `inputs`. What `depends` says of positions and rotations of markers holds for their
+  and after t the scalars z if it has `inputs`. What `depends` states of positions and rotations of markers holds for their
   velocities and angular velocities too, here and in forces.
 
   A force: components c(frames, twists, t, z), and the wrenches on the markers' bodies that they stand for,
@@ -33,12 +33,12 @@
       template <class T> static void apply(const Data &, const Frame<T> *f, const T *c, Wrench<T> *on);
     };
 
-  so that the components can be carried as force states F of the paper: then c are unknowns, and apply() alone makes the load.
-  `damped`: components() uses the twists. `inputs`: number of further scalar unknowns z (multipliers, V, states) that it uses.
+  so that the components can be force states F of the paper: then c are unknowns, and the load depends on them through apply() only.
+  `damped`: components() depends on the twists. `inputs`: number of further scalar unknowns z (multipliers, V, states) on which it depends.
 
   Memory of accepted steps (unwinding of angles, say): `static constexpr int memory = 1`, Data begins with `double memory[1]`, and
-  accept(Data &, frames) updates it after each accepted step. `angles`: so many numbers at its beginning are angles of marker 2k about
-  the z axis of marker 2k+1, counted over full turns, which questions to a run are answered by.
+  accept(Data &, frames) updates it after each accepted step. `angles`: number of its first values that are angles over full turns of marker
+  2k about the z axis of marker 2k+1 (or as markersOfAngle() states); queries of a run use them.
 */
 #ifndef HHTDAE_SCENE_KERNEL_H
 #define HHTDAE_SCENE_KERNEL_H
@@ -57,7 +57,7 @@ constexpr unsigned Rotation(int k) { return 2u << (2 * k); }
 constexpr unsigned Everything(int markers) { return (1u << (2 * markers)) - 1; }
 constexpr bool     Depends(unsigned mask, int a) { return (mask >> a) & 1u; }
 
-/* n arguments of a kernel; none: a null pointer, so that nothing undefined is handed on */
+/* n arguments of a kernel; n = 0: a null pointer */
 template <class T, int n> struct Arguments {
   T        value[n];
   const T *data() const { return value; }
@@ -72,20 +72,20 @@ template <int N, int M> void SeedAll(const Frame<double> *f, Frame<Dual<N>> *s)
   for (int k = 0; k < M; k++) s[k] = Seed<N>(f[k], 6 * k);
 }
 
-/* What constraints of both kinds share */
+/* Common part of constraints at position and velocity level */
 template <class K, int M, int R> struct ConstraintBase {
   static constexpr int      markers = M, rows = R, size = 6 * M;
   static constexpr int      memory = 0, inputs = 0, angles = 0;
   static constexpr unsigned depends = Everything(M);
   static constexpr bool     needs_rotation = true; /* false: f[k].R may be left undefined */
-  static constexpr bool     own_units = false;     /* rows are in units of the user's own, neither lengths nor sines */
-  static constexpr bool     says_angle     = false;     /* angleAt() tells the angle of marker 0 about z of marker 1 at any time */
-  static constexpr bool     translates = false;    /* row r is component r of the second marker's position less that of the first, and nothing else */
+  static constexpr bool     own_units            = false; /* rows have units that the user chooses, neither lengths nor sines */
+  static constexpr bool     prescribes_angle     = false; /* angleAt() gives the angle of marker 0 about z of marker 1 at any time */
+  static constexpr bool     purely_translational = false; /* row r is component r of the second marker's position minus that of the first */
   using Data                               = Empty;
   using Gradient                           = Matrix<R, size>;
   using Hessian                            = Matrix<size, size>;
   static constexpr bool curved(int a, int b) { return Depends(K::depends, a) && Depends(K::depends, b); }
-  template <class Data> static std::array<int, 2> markersOfAngle(const Data &, int k) { return {2 * k, 2 * k + 1}; } /* of those that are counted over full turns */
+  template <class Data> static std::array<int, 2> markersOfAngle(const Data &, int k) { return {2 * k, 2 * k + 1}; } /* markers of the k-th angle over full turns */
 };
 
 template <class K, int M, int R> struct Constraint : ConstraintBase<K, M, R> {
@@ -116,7 +116,7 @@ template <class K, int M, int R> struct Constraint : ConstraintBase<K, M, R> {
       for (int a = 0; a < N; a++) H.row(a) += lambda[r] * DerivativeRow(phi[r].derivatives()(a));
   }
 
-  /* the partial derivative Phi_t; kernels without time inherit zeros */
+  /* the partial derivative Phi_t; zero for kernels that do not depend on time */
   static constexpr bool driven = false; /* value() depends on t */
   template <class Data> static void time(const Data &d, const Frame<double> *f, double t, double *rate)
   {
@@ -211,10 +211,10 @@ template <class K, int M, int C> struct Force {
   static constexpr int      markers = M, count = C, size = 6 * M, inputs = 0, memory = 0, angles = 0;
   static constexpr unsigned depends = Everything(M); /* what components() and apply() use */
   static constexpr unsigned acts    = Everything(M); /* Position(k): a force at k, Rotation(k): a moment at k */
-  static constexpr bool     damped = true, needs_rotation = true, says_angle = false;
-  static constexpr bool     carriable = true; /* its description lets the user carry the components as force states */
+  static constexpr bool     damped = true, needs_rotation = true, prescribes_angle = false;
+  static constexpr bool     may_be_force_states = true; /* the user can choose force states for the components */
   using Data = Empty;
-  template <class Data> static std::array<int, 2> markersOfAngle(const Data &, int k) { return {2 * k, 2 * k + 1}; } /* of those that are counted over full turns */
+  template <class Data> static std::array<int, 2> markersOfAngle(const Data &, int k) { return {2 * k, 2 * k + 1}; } /* markers of the k-th angle over full turns */
 
   template <class Data>
   static void wrench(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *z, Wrench<double> *on)
@@ -224,7 +224,7 @@ template <class K, int M, int C> struct Force {
     K::template apply<double>(d, f, c, on);
   }
 
-  /* Derivatives of the wrenches; hidden by kernels that know better. on: the wrenches themselves */
+  /* Derivatives of the wrenches, by automatic differentiation unless a kernel defines its own. on: the wrenches themselves */
   template <class Data, int Z>
   static void jacobian(const Data &d, const Frame<double> *f, const Twist<double> *w, double t, const double *z, Wrench<double> *on,
                        ForceJacobian<M, Z> &J)

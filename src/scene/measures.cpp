@@ -25,15 +25,15 @@ Vector3 AxisOf(const LocalMeasure &m, const Evaluation &e)
   return m.frame < 0 ? Vector3(Vector3::Unit(m.component)) : Vector3(e.bodies.frame(m.frame).R.col(m.component));
 }
 
-constexpr int kMarkers = 6,
-              kRows    = 8; /* of a constraint, at most: couplers of three joints; StoreBase::active() has 8 bits */
+constexpr int max_reaction_markers = 6,
+              max_reaction_rows    = 8; /* largest numbers of a constraint: couplers of three joints have 6 markers; StoreBase::active() has 8 bits */
 
 bool OnBody(const Evaluation &e, const LocalMeasure &m, PetscInt marker)
 {
   return e.bodies.marker[marker].body == e.bodies.marker[m.i].body;
 }
 
-/* i's body, or where the element does not act on that attachment its flexible body, on whose modes it may act */
+/* i's body, or, if this is an attachment on which the element does not act, its flexible body, on whose modes it may act */
 PetscInt LoadedBody(const LocalMeasure &m, const Evaluation &e)
 {
   const PetscInt body = e.bodies.marker[m.i].body, carrier = e.bodies.body[body].carrier;
@@ -44,11 +44,11 @@ PetscInt LoadedBody(const LocalMeasure &m, const Evaluation &e)
   return e.bodies.carriers[carrier].body;
 }
 
-/* the force on i's body, or moment about i's origin, of a joint or of any element */
+/* force on i's body, or moment about i's origin, by an element */
 Vector3 ReactionOf(const LocalMeasure &m, const Evaluation &e)
 {
   const Vector3  x = e.bodies.frame(m.i).x;
-  Wrench<double> on[kMarkers];
+  Wrench<double> on[max_reaction_markers];
   Vector3        sum  = Vector3::Zero();
   const PetscInt body = LoadedBody(m, e);
   for (const auto &p : m.probes) {
@@ -64,7 +64,7 @@ Vector3 ReactionOf(const LocalMeasure &m, const Evaluation &e)
   return sum;
 }
 
-/* J by (x, theta) of a marker, to its body's coordinates */
+/* Transforms a gradient J by (x, theta) of a marker to its body's coordinates and adds it to the row */
 void AddMarker(const Evaluation &e, PetscInt marker, const Matrix<1, 6> &J, int at, double *row)
 {
   if (at < 0) return;
@@ -81,9 +81,9 @@ void AddJointGradient(const LocalMeasure &m, const Evaluation &e, double factor,
   const Vector3 axis = factor * AxisOf(m, e), x = e.bodies.frame(m.i).x;
   std::size_t   next = 3;
   for (const auto &p : m.probes) {
-    Wrench<double>          on[kMarkers];
-    Matrix<6 * kMarkers, 1> y = Matrix<6 * kMarkers, 1>::Zero(), by = y;
-    double                  lambda[kRows];
+    Wrench<double>                      on[max_reaction_markers];
+    Matrix<6 * max_reaction_markers, 1> y = Matrix<6 * max_reaction_markers, 1>::Zero(), by = y;
+    double                              lambda[max_reaction_rows];
     p->reaction(e, on);
     for (int k = 0; k < p->markers(); k++) {
       if (!OnBody(e, m, p->marker(k))) continue;
@@ -112,7 +112,7 @@ void AddJointGradient(const LocalMeasure &m, const Evaluation &e, double factor,
   AddMarker(e, m.frame, turn, at[2], row);
 }
 
-/* ---- where things are ---- */
+/* ---- placing ---- */
 
 void PlaceJoint(Localizer &l, const Measure &m, LocalMeasure &k)
 {
@@ -129,7 +129,7 @@ void PlaceComponent(Localizer &l, const Measure &m, LocalMeasure &k)
 {
   PetscInt    row  = m.component;
   const Part *part = FindPart(l.run->scene, m.target, false, row);
-  if (part->store->carried(part->index)) {
+  if (part->store->asForceStates(part->index)) {
     k.input = l.input({ScalarRef::ForceState, m.target, m.component});
   } else {
     k.component = (int)row;
@@ -145,7 +145,7 @@ void PlaceLoad(Localizer &l, const Measure &m, LocalMeasure &k)
   for (const Part &p : s.elements[m.target].parts) k.probes.push_back(p.store->probe(l, p.index));
 }
 
-constexpr int kComponents = 12; /* of a force, at most */
+constexpr int max_force_components = 12; /* of a force, at most */
 
 } // namespace
 
@@ -170,7 +170,7 @@ bool FollowsFromEquations(const SceneData &s, const Measure &m)
   if (!part) return false;
   const std::vector<Expression> *own = part->store->expressions(part->index);
   const auto follows = [&](const Measure &a) { return FollowsFromEquations(s, a); };
-  return part->store->carried(part->index) || part->store->inputs() > 0 ||
+  return part->store->asForceStates(part->index) || part->store->inputs() > 0 ||
          (own && std::any_of(own->begin(), own->end(), [&](const Expression &f) {
             return std::any_of(f.arguments.begin(), f.arguments.end(), follows);
           }));
@@ -190,7 +190,7 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
   k.kind      = m.kind;
   k.component = m.component;
   const bool of_element = IsJoint(m.kind) || IsLoad(m.kind) || m.kind == Measure::Multiplier || m.kind == Measure::Component;
-  if (of_element && s.elements[m.target].parts.empty()) { /* absent: a scalar that is nowhere, and zero */
+  if (of_element && s.elements[m.target].parts.empty()) { /* an element without parts: zero, as a dropped multiplier */
     k.kind = Measure::Multiplier;
     return k;
   }
@@ -239,7 +239,7 @@ double MeasureValue(const LocalMeasure &m, const Evaluation &e)
 {
   if (m.kind == Measure::Time) return e.t;
   if (IsScalar(m.kind) && !m.probes.empty()) {
-    double c[kComponents];
+    double c[max_force_components];
     m.probes[0]->components(e, c);
     return c[m.component];
   }
@@ -305,7 +305,7 @@ int Columns::body(const Bodies &B, PetscInt b)
   if (k.kind == BodyKind::Ground) return -1;
   const int start = add(k.group, GroupSize(k.kind, 0));
   for (int g = 1; g < (k.kind == BodyKind::Attached ? frame_groups : Groups(k.kind)); g++)
-    add(k.group + g, GroupSize(k.kind, g)); /* right behind: a body's groups come together */
+    add(k.group + g, GroupSize(k.kind, g)); /* the groups of a body are consecutive */
   return start;
 }
 

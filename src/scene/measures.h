@@ -1,9 +1,8 @@
 /*
-  Measures with their place among this rank's unknowns: values, and derivatives by the unknowns they depend on.
+  Measures in terms of this rank's local unknowns: values, and derivatives by the unknowns on which they depend.
 
-    LocalMeasure m = PlaceMeasure(localizer, Measure::distance(a, b));   while the scene is laid out, on the rank that
-  will read it double       x = MeasureValue(m, evaluation);                        t, u, v, a of the local unknowns;
-  bodies have moved there
+    LocalMeasure m = PlaceMeasure(localizer, Measure::distance(a, b));   during the layout, on the rank that evaluates it
+    double       x = MeasureValue(m, evaluation);                        after the bodies have been moved to this state
 */
 #ifndef HHTDAE_SCENE_MEASURES_H
 #define HHTDAE_SCENE_MEASURES_H
@@ -21,8 +20,8 @@ struct LocalMeasure {
   int                                 component = 0;
   PetscInt                            i = -1, j = -1, frame = -1; /* local markers; -1: the space origin, space axes */
   Input                               input;                      /* a scalar unknown */
-  double                              angle = 0; /* counted over full turns, at the last accepted step */
-  PetscInt                            of[2] = {-1, -1}; /* markers of an angle, in the scene */
+  double                              angle = 0;                  /* over full turns, at the last accepted step */
+  PetscInt                            of[2] = {-1, -1};           /* the scene's numbers of the markers of an angle */
   std::vector<std::unique_ptr<Probe>> probes;
 
   void     accept(const Bodies &B);
@@ -32,35 +31,35 @@ struct LocalMeasure {
     *x = angle;
     return true;
   }
-  double   longestStep(const Evaluation &e) const; /* for angles */
+  double   longestStep(const Evaluation &e) const; /* upper bound on the step size, for angles */
   PetscInt memory() const;
   void     copyMemory(double *x, bool in);
 };
 
-/* Marker motions beyond what the local unknowns of this rank hold are asked for through the localizer, in both of its
-   passes. Kinetic and potential energy are not placed: they belong to the whole scene. */
+/* Requests unknowns of other ranks through the localizer, in both of its passes. Kinetic and potential energy need no unknowns here: they are those of the
+   whole scene. */
 LocalMeasure PlaceMeasure(Localizer &l, const Measure &m);
 
 double MeasureValue(const LocalMeasure &m, const Evaluation &e);
 
-/* The part of an element that has row or component `row`, which becomes the part's own; null if none has */
+/* The part of an element that contains row or component `row`, which is changed to its number in the part; null if there is none */
 const Part *FindPart(const SceneData &s, PetscInt element, bool constraint, PetscInt &row);
 
 bool NeedsAcceleration(const Measure &m);
-/* Whether positions, velocities and states do not determine it, but accelerations, multipliers, variables or force states */
+/* Whether the measure depends on accelerations, multipliers, variables or force states, not only on positions, velocities and states */
 bool FollowsFromEquations(const SceneData &s, const Measure &m);
 bool NeedsAcceleration(const Expression &f);
 
-/* What is wrong with a measure, empty if nothing; in_equation: as an argument of an expression, which needs its
+/* Error of a measure as text, empty if there is none; in_equation: it is an argument of an expression, which needs its
  * derivatives */
 std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation);
 const char *NameOf(Measure::Kind k); /* "angular velocity" */
-/* who: "variable speed"; adds what is wrong */
+/* who: "variable speed"; adds the errors of an expression */
 void CheckExpression(const SceneData &s, const std::string &who, const Expression &e, std::vector<std::string> &errors);
-/* Variables, states and user's forces: adds what is wrong with them */
+/* Adds the errors of variables, states and users' forces */
 void CheckExpressions(const SceneData &s, std::vector<std::string> &errors);
 
-/* The unknowns that several functions depend on, group by group, side by side as the columns of a dense matrix */
+/* The unknowns on which several functions depend, as columns of a dense matrix, group by group */
 struct Columns {
   struct Part {
     PetscInt group;
@@ -69,7 +68,7 @@ struct Columns {
   std::vector<Part> parts;
   int               width = 0;
 
-  /* where the coordinates of a body start, -1 for the ground; where a scalar is, -1 for one that was dropped */
+  /* first column of a body, -1 for the ground; column of a scalar, -1 for a dropped multiplier */
   int body(const Bodies &B, PetscInt b);
   int scalar(const Pattern &p, const Input &i);
 
@@ -77,14 +76,14 @@ private:
   int add(PetscInt group, int size);
 };
 
-/* Arguments of expressions */
+/* The measures that are arguments of an expression */
 class MeasureSet
 {
 public:
   void place(Localizer &l, const Measure &m) { all_.push_back(PlaceMeasure(l, m)); }
   int  size() const { return (int)all_.size(); }
 
-  /* when everything has been placed: the columns */
+  /* determines the columns, after all measures have been placed */
   void           connect(const Bodies &B, const Pattern &p);
   const Columns &columns() const { return columns_; }
 
@@ -104,7 +103,7 @@ private:
   Columns columns_;
 };
 
-/* A batch that reads measures: what these remember of accepted steps, count, and allow as a step */
+/* A batch that reads measures: implements memory, counted angles and step limits by those of the measures */
 template <class Base> class ReadingBatch : public Base
 {
 public:
@@ -146,7 +145,7 @@ public:
 
 protected:
   using Visit = std::function<void(LocalMeasure &)>;
-  virtual void each(const Visit &f) = 0; /* in the same order every time */
+  virtual void each(const Visit &f) = 0; /* calls f for all measures, always in the same order */
 
 private:
   void read(const Visit &f) const { const_cast<ReadingBatch *>(this)->each(f); }

@@ -1,12 +1,11 @@
 /*
-  The smallest change of pose or velocity, in the metric of the masses, that takes the constraints where they have to
-  be:
+  The smallest change d of poses or velocities, in the metric of the masses, with Phi_q d = rhs:
 
     d = d_0 + M^-1 Phi_q^T mu,   (Phi_q M^-1 Phi_q^T + delta) mu = rhs - Phi_q d_0
 
-  in velocities and angular velocities in space axes, where M is a small block a body. delta, some 1e-11 of the
-  diagonal, lets the matrix be positive definite where constraints are redundant; what it costs in accuracy the
-  iteration around it makes good.
+  in velocities and angular velocities in space axes, in which M has one small block per body. delta = 1e-11 times the
+  diagonal keeps the matrix positive definite if constraints are redundant; the error that it causes is removed by the
+  iterations of the caller.
 */
 #include "products.h"
 #include "start.h"
@@ -18,7 +17,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr double regularization = 1e-11;
+constexpr double regularization = 1e-11; /* delta relative to the diagonal */
 
 /* M^-1 of a body in its directions of motion */
 Eigen::MatrixXd Mobility(const SceneData &s, const BodyData &b)
@@ -40,7 +39,7 @@ Eigen::MatrixXd Mobility(const SceneData &s, const BodyData &b)
   return W;
 }
 
-/* The columns of a block's k-th body, rows that are not active cleared */
+/* The columns of a block's k-th body; inactive rows are zero */
 Eigen::MatrixXd ColumnsOf(const RowBlock &b, std::size_t k)
 {
   Eigen::MatrixXd J = b.J.middleCols(b.column[k], b.column[k + 1] - b.column[k]);
@@ -61,7 +60,7 @@ NearestSystem::~NearestSystem()
   PetscCallAbort(PETSC_COMM_SELF, VecScatterDestroy(&scatter_));
 }
 
-/* Rows go to the owners of their elements */
+/* Numbers the rows; the owner of an element owns its rows */
 PetscErrorCode NearestSystem::number(const std::vector<RowBlock> &blocks)
 {
   std::vector<PetscInt>    next(M.size + 1, 0);
@@ -87,14 +86,14 @@ PetscErrorCode NearestSystem::number(const std::vector<RowBlock> &blocks)
   PetscFunctionReturn(0);
 }
 
-/* Own rows of Phi_q M^-1 Phi_q^T + delta: a body couples all blocks that touch it */
+/* This rank's rows of Phi_q M^-1 Phi_q^T + delta: a body couples all blocks that contain it */
 PetscErrorCode NearestSystem::assemble(const std::vector<RowBlock> &blocks)
 {
-  struct At {
+  struct BodyColumns {
     std::size_t block, body;
   };
   const SceneData             &s = M.scene;
-  std::vector<std::vector<At>> at(s.bodies.size());
+  std::vector<std::vector<BodyColumns>> at(s.bodies.size());
   std::vector<PetscInt>        I, J;
   std::vector<PetscScalar>     values;
   std::vector<std::size_t>     first(blocks.size());
@@ -108,12 +107,12 @@ PetscErrorCode NearestSystem::assemble(const std::vector<RowBlock> &blocks)
   for (std::size_t b = 0; b < at.size(); b++) {
     if (at[b].empty()) continue;
     const Eigen::MatrixXd W = Mobility(s, s.bodies[b]);
-    for (const At &p : at[b]) {
+    for (const BodyColumns &p : at[b]) {
       const Eigen::MatrixXd JW = ColumnsOf(blocks[p.block], p.body) * W;
       for (int r = 0; r < blocks[p.block].rows; r++)
         weight_[first[p.block] + r] += JW.row(r).dot(ColumnsOf(blocks[p.block], p.body).row(r));
       if (!mine(row_[p.block])) continue;
-      for (const At &q : at[b]) {
+      for (const BodyColumns &q : at[b]) {
         const Eigen::MatrixXd B = JW * ColumnsOf(blocks[q.block], q.body).transpose();
         for (int r = 0; r < B.rows(); r++)
           for (int c = 0; c < B.cols(); c++) {

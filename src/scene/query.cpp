@@ -1,6 +1,6 @@
 /*
-  Questions to a run. Motion and loads are computed where the body or the element is, and sent to the other ranks; what a measure says
-  is put together from them everywhere (query_measures.cpp).
+  Queries of a run. Motion and loads are computed by the owner of the body or element and sent to the other ranks; measures are
+  evaluated from them on all ranks (query_measures.cpp).
 */
 #include "hhtdae/query.h"
 #include "snapshot.h"
@@ -31,7 +31,7 @@ PetscReal Snapshot::time() const { return work_->t; }
 namespace
 {
 
-/* The unknowns on every rank that reads them */
+/* Local unknowns of a state: own ones and those of other ranks that this rank reads */
 PetscErrorCode Localize(Runtime &R, Vec W[3], std::vector<double> *out[3])
 {
   const double       *w[3], *local[3];
@@ -44,7 +44,7 @@ PetscErrorCode Localize(Runtime &R, Vec W[3], std::vector<double> *out[3])
   PetscFunctionReturn(0);
 }
 
-constexpr int motion_size = 24;
+constexpr int motion_size = 24; /* numbers of a Motion */
 
 void Pack(const Motion &m, double *x)
 {
@@ -60,7 +60,7 @@ void Unpack(const double *x, Motion &m)
   m.axes = Eigen::Map<const Matrix3>(x);
 }
 
-/* Of a body of this rank, at its centre of mass */
+/* Motion of a body of this rank, at its centre of mass */
 Motion OfBody(const Runtime &R, PetscInt id, const Evaluation &e)
 {
   const PetscInt    b = R.local_body[id];
@@ -75,8 +75,8 @@ Motion OfBody(const Runtime &R, PetscInt id, const Evaluation &e)
   return m;
 }
 
-/* At a point of the same body, with axes of its own */
-Motion Moved(const Motion &b, const Vector3 &s, const Matrix3 &axes)
+/* Motion of the point at s of the same body, with its own axes */
+Motion MotionAtPoint(const Motion &b, const Vector3 &s, const Matrix3 &axes)
 {
   const Vector3 arm = b.axes * s, &w = b.angular_velocity;
   Motion        m   = b;
@@ -87,7 +87,7 @@ Motion Moved(const Motion &b, const Vector3 &s, const Matrix3 &axes)
   return m;
 }
 
-void Resolve(Motion &m, const Matrix3 &R)
+void ToAxes(Motion &m, const Matrix3 &R)
 {
   for (Vector3 *y : {&m.position, &m.velocity, &m.acceleration, &m.angular_velocity, &m.angular_acceleration}) *y = R.transpose() * *y;
   m.axes = R.transpose() * m.axes;
@@ -113,7 +113,7 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   for (Vec &x : W) PetscCall(VecDuplicate(U, &x));
   PetscErrorCode failed = StateAt(ts, t, true, W, &copy);
   if (!failed) failed = take(*w.R, t, W);
-  /* attitudes that a first step in the run's place has found count from what that step has referred them to */
+  /* a copy that has made the first step has its own reference attitudes */
   for (std::size_t b = 0; copy && !failed && b < w.origin.references.size(); b++) w.origin.references[b] = RunOf(copy)->bodies.body[b].C;
   PetscCall(TSDestroy(&copy));
   for (Vec &x : W) PetscCall(VecDestroy(&x));
@@ -121,7 +121,7 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   PetscFunctionReturn(0);
 }
 
-/* u, u' and u'' of the run at t, whatever it has reached */
+/* state: u, u' and u'' at t, which need not be the present state of the run */
 PetscErrorCode Snapshot::take(Runtime &run, PetscReal t, Vec state[3])
 {
   Work &w = *work_;
@@ -173,12 +173,12 @@ PetscErrorCode Snapshot::Work::motion(PetscInt marker, Motion *x)
   PetscFunctionBegin;
   PetscCall(hasBody(m.body));
   if (m.body < 0) {
-    *x = Moved(Motion(), m.s, m.R);
+    *x = MotionAtPoint(Motion(), m.s, m.R);
     PetscFunctionReturn(0);
   }
   PetscCall(FromOwner(*R, owner(m.body), numbers, motion_size, [&](double *y) {
     move();
-    Pack(Moved(OfBody(*R, m.body, at()), m.s, m.R), y);
+    Pack(MotionAtPoint(OfBody(*R, m.body, at()), m.s, m.R), y);
   }));
   Unpack(numbers, *x);
   PetscFunctionReturn(0);
@@ -194,7 +194,7 @@ PetscErrorCode Snapshot::motion(Marker m, Motion *x, Marker axes)
   if (axes.id == -1) PetscFunctionReturn(0);
   CHECK_MARKER(*work_, axes, "that of the axes");
   PetscCall(work_->motion(axes.id, &f));
-  Resolve(*x, f.axes);
+  ToAxes(*x, f.axes);
   PetscFunctionReturn(0);
 }
 
@@ -214,7 +214,7 @@ PetscErrorCode Snapshot::relativeMotion(Marker m, Marker to, Motion *x)
   x->angular_velocity -= w;
   x->position = d;
   x->velocity = v;
-  Resolve(*x, f.axes);
+  ToAxes(*x, f.axes);
   PetscFunctionReturn(0);
 }
 

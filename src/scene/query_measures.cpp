@@ -1,4 +1,4 @@
-/* What measures say of the state that a snapshot has taken, on all ranks. */
+/* Values of measures in the state of a snapshot, on all ranks. */
 #include "measures.h"
 #include "output/energy.h"
 #include "snapshot.h"
@@ -6,7 +6,7 @@
 namespace hhtdae
 {
 
-/* An unknown; -1: it was dropped, and is zero */
+/* Value of an unknown; global = -1: a dropped multiplier, zero */
 PetscErrorCode Snapshot::Work::scalar(PetscMPIInt owner, PetscInt global, double *x)
 {
   PetscFunctionBegin;
@@ -32,7 +32,7 @@ PetscErrorCode Snapshot::Work::component(const ElementData &e, PetscInt row, boo
       PetscInt            place  = 0;
       for (PetscInt i = 0; i < row; i++) place += active >> i & 1;
       PetscCall(scalar(owner, active >> row & 1 ? p.store->start[p.index] + place : -1, x));
-    } else if (p.store->carried(p.index)) {
+    } else if (p.store->asForceStates(p.index)) {
       PetscCall(scalar(owner, p.store->start[p.index] + row, x));
     } else {
       PetscCall(FromOwner(*R, owner, x, 1, [&](double *y) {
@@ -71,7 +71,7 @@ PetscErrorCode Snapshot::Work::ofMarkers(const Measure &m, double *x)
   PetscFunctionReturn(0);
 }
 
-/* The run counts the turns of an angle from the first question for it on */
+/* From the first query of an angle on the run counts its full turns */
 PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
 {
   const auto                same = [&](const CountedAngle &c) { return c.i == i && c.j == j; };
@@ -86,8 +86,8 @@ PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
   } else {
     const CountFrom then(*R, origin);
     PetscCall(FirstAngle(*R, u.data(), t, i, j, &now[0]));
-    const bool here = origin.accepts == R->accepts; /* else the run has gone on since the state was taken */
-    if (here && std::none_of(R->asked.begin(), R->asked.end(), same)) R->asked.push_back(now[0]);
+    const bool here = origin.accepted_states == R->accepted_states; /* else the run has made steps since the state was taken */
+    if (here && std::none_of(R->queried_angles.begin(), R->queried_angles.end(), same)) R->queried_angles.push_back(now[0]);
     origin.counted.push_back(now[0]);
   }
   PetscCall(CountAngles(*R, u.data(), now));

@@ -1,18 +1,16 @@
 /*
-  Constraints that say the same thing twice.
+  Finds redundant constraints: rows of Phi_q that depend linearly on others.
 
-  A body whose rows are independent in its own columns takes part in no redundancy, and neither do its rows: it is cut
-  off, then its neighbours are looked at again. Trees vanish in this way. What is left, loops that may be redundant,
-  goes through a sparse elimination, row by row in a fill-reducing order of the elements: rows that vanish are
-  redundant. (Sparse QR is some hundred times slower on nets of loops.) Every rank has the description and computes the
-  same.
+  If the rows of a body are independent in its own columns, none of them takes part in a dependence: the body and its rows are removed, and its
+  neighbours are examined again. Tree structures vanish in this way. The remaining loops are eliminated by sparse Gaussian elimination, row by row in a
+  fill-reducing order of the elements: rows that vanish are redundant. (Sparse QR is some hundred times slower on nets of loops.) Every rank has the
+  description and computes the same.
 
-  Rows are made comparable: lengths in units of the scene's size, modal coordinates in the same by the body's mass (SmallBodies.Attachments), each row of
-  norm one.
+  Rows are scaled: translations are in units of the scene's size, modal coordinates in units that move the body's mass by it (SmallBodies.Attachments), and each
+  row has norm one.
 
-  At a singular position rows are dependent that are not elsewhere. So where redundant rows are found they are looked
-  for again at a neighbouring position that satisfies the constraints, and only those that are redundant there too are
-  dropped.
+  At a singular position rows may be dependent that are independent elsewhere. So redundant rows are determined again at a neighbouring position that
+  satisfies the constraints, and only those that are redundant there, too, are dropped.
 */
 #include "extension.h"
 #include "start.h"
@@ -31,11 +29,11 @@ namespace hhtdae
 namespace
 {
 
-constexpr double clearly_independent = 1e-3; /* least pivot for a body to be cut off */
-constexpr double neighbour           = 0.02; /* how far away: radians, parts of the scene's size */
+constexpr double clearly_independent = 1e-3; /* least pivot of a body's rows, of norm one, for the body to be removed */
+constexpr double neighbour_distance  = 0.02; /* displacement to the neighbouring position: radians, parts of the scene's size */
 
-/* Dimensions and directions are given to some seven digits: rows whose independence is less than this are dependent as far as the description tells. With 1e-9 a hinge that
-   was 1e-8 rad out of line locked a linkage, without a word and by any moment (SceneRedundant.AHingeSlightlyOutOfLine). What is dropped has to hold at a neighbouring position, too. */
+/* Pivots of rows of norm one below this count as zero, since dimensions and directions are described to about seven digits. With 1e-9 a hinge 1e-8 rad out of line locked a linkage without a
+   message, with arbitrarily large moments (SceneRedundant.AHingeSlightlyOutOfLine). */
 constexpr double rounding_of_descriptions = 1e-6;
 
 using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
@@ -45,7 +43,7 @@ struct RowRef {
   int         row;
 };
 
-/* Scaled rows: lengths in units of the scene's size, modal coordinates in those in which they move the body's mass as far, norm one */
+/* Scales the rows: translations in units of `size`, modal coordinates by size * sqrt(mass), rows to norm one */
 void Scale(const SceneData &s, std::vector<RowBlock> &blocks, double size)
 {
   for (RowBlock &b : blocks) {
@@ -64,7 +62,8 @@ void Scale(const SceneData &s, std::vector<RowBlock> &blocks, double size)
   }
 }
 
-/* A length by which translations and rotations compare: the scene's size, but not far beyond the bodies' own, where a small mechanism is far from the origin or from others */
+/* Length that relates translations to rotations: the scene's size, but at most ten times the largest distance of a marker from its body's centre of mass, so that a small mechanism
+   far from the origin or from others is scaled properly */
 double LengthOfBodies(const SceneData &s)
 {
   double arm = 0, size = SceneSize(s);
@@ -73,16 +72,16 @@ double LengthOfBodies(const SceneData &s)
   return arm > 0 ? std::min(size, 10 * arm) : size;
 }
 
-/* The rows left after trees have been cut off, in the order of the blocks */
+/* Removes tree structures; core() has the remaining rows in the order of the blocks */
 class Pruning
 {
 public:
   Pruning(const SceneData &s, const std::vector<RowBlock> &blocks)
-      : s_(s), blocks_(blocks), at_(s.bodies.size()), open_(blocks.size())
+      : s_(s), blocks_(blocks), blocks_at_(s.bodies.size()), open_(blocks.size())
   {
     for (std::size_t k = 0; k < blocks.size(); k++) {
       open_[k] = blocks[k].active & ((1u << blocks[k].rows) - 1);
-      for (PetscInt b : blocks[k].body) at_[b].push_back(k);
+      for (PetscInt b : blocks[k].body) blocks_at_[b].push_back(k);
     }
     std::vector<char>    queued(s.bodies.size(), 1);
     std::deque<PetscInt> queue;
@@ -91,7 +90,7 @@ public:
       const PetscInt b = queue.front();
       queue.pop_front();
       queued[b] = 0;
-      for (std::size_t k : cut(b))
+      for (std::size_t k : cutOff(b))
         for (PetscInt c : blocks_[k].body)
           if (c != b && !queued[c]) {
             queued[c] = 1;
@@ -111,15 +110,15 @@ public:
 private:
   const SceneData                      &s_;
   const std::vector<RowBlock>          &blocks_;
-  std::vector<std::vector<std::size_t>> at_; /* blocks at each body */
-  std::vector<unsigned>                 open_;
+  std::vector<std::vector<std::size_t>> blocks_at_; /* of each body */
+  std::vector<unsigned>                 open_;      /* bits of the remaining rows of each block */
 
-  /* Blocks that lost rows because their rows at body b are independent in b's columns */
-  std::vector<std::size_t> cut(PetscInt b)
+  /* Removes the rows at body b if they are independent in its columns; returns the blocks that have lost rows */
+  std::vector<std::size_t> cutOff(PetscInt b)
   {
     const int           width = Width(s_, b);
     std::vector<RowRef> rows;
-    for (std::size_t k : at_[b]) {
+    for (std::size_t k : blocks_at_[b]) {
       const RowBlock &e    = blocks_[k];
       const auto      body = std::find(e.body.begin(), e.body.end(), b) - e.body.begin();
       for (int r = 0; r < e.rows; r++) {
@@ -148,12 +147,12 @@ private:
   }
 };
 
-/* Order of elimination: fill is kept small by COLAMD on elements and bodies, within an element positions come before
-   directions, for what comes last is what gets dropped */
+/* Order of elimination: COLAMD on elements and bodies reduces fill; elements that are never redundant come first; within an element rows of positions come before
+   those of directions, because the last of dependent rows is dropped */
 std::vector<std::size_t> EliminationOrder(const std::vector<RowBlock> &blocks, const std::vector<RowRef> &core,
                                           std::size_t bodies)
 {
-  std::vector<std::size_t>            first; /* of the rows of an element */
+  std::vector<std::size_t>            first; /* row of each element */
   std::vector<Eigen::Triplet<double>> entry;
   for (std::size_t k = 0; k < core.size(); k++) {
     if (!k || blocks[core[k].block].element != blocks[core[k - 1].block].element) first.push_back(k);
@@ -167,7 +166,7 @@ std::vector<std::size_t> EliminationOrder(const std::vector<RowBlock> &blocks, c
   std::vector<std::size_t> place(first.size()), order;
   for (std::size_t e = 0; e < first.size(); e++) place[p.indices()(e)] = e;
   std::stable_partition(place.begin(), place.end(),
-                        [&](std::size_t e) { return blocks[core[first[e]].block].store->everIndependent(); });
+                        [&](std::size_t e) { return blocks[core[first[e]].block].store->neverRedundant(); });
   for (std::size_t e : place)
     for (bool length : {true, false})
       for (std::size_t k = first[e]; k < (e + 1 < first.size() ? first[e + 1] : core.size()); k++)
@@ -176,16 +175,16 @@ std::vector<std::size_t> EliminationOrder(const std::vector<RowBlock> &blocks, c
 }
 
 /*
-  Gaussian elimination of one sparse row after the other, each with its largest remaining entry as the pivot: a row of
-  which nothing remains is a combination of those before it.
+  Gaussian elimination of one sparse row after the other, each with its largest remaining entry as the pivot: a row that
+  vanishes is a linear combination of those before it.
 */
 class Elimination
 {
 public:
   explicit Elimination(int columns) : pivot_(columns, -1), work_(columns, 0.0), seen_(columns, 0) {}
 
-  /* false if the row depends on those that were taken */
-  bool take(const std::vector<std::pair<int, double>> &row, double threshold)
+  /* false if the row depends on those that were added before */
+  bool add(const std::vector<std::pair<int, double>> &row, double threshold)
   {
     std::vector<int> touched;
     const auto       touch = [&](int c) {
@@ -233,7 +232,7 @@ private:
     if (good) {
       Row r{best, {}};
       for (int c : touched)
-        if (c != best && pivot_[c] < 0 && std::abs(work_[c]) > drop) r.rest.emplace_back(c, work_[c] / work_[best]);
+        if (c != best && pivot_[c] < 0 && std::abs(work_[c]) > rounding_of_rows) r.rest.emplace_back(c, work_[c] / work_[best]);
       pivot_[best] = (int)rows_.size();
       rows_.push_back(std::move(r));
     }
@@ -243,17 +242,17 @@ private:
     }
     return good;
   }
-  static constexpr double drop = 1e-14; /* rounding of rows of norm one */
+  static constexpr double rounding_of_rows = 1e-14; /* entries below this are rounding: rows have norm one */
 };
 
-/* Which rows of the core depend on the others, in the order of the description */
+/* The rows of the core that depend on the others, in the order of the description */
 std::vector<RowRef> Dependent(const SceneData &s, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &core,
                               double threshold)
 {
   std::vector<RowRef> found;
   if (core.empty()) return found;
   std::vector<std::pair<int, double>> row;
-  std::vector<std::size_t>            dead;
+  std::vector<std::size_t>            redundant;
   std::vector<int>                    first(s.bodies.size() + 1, 0); /* column */
   for (std::size_t b = 0; b < s.bodies.size(); b++) first[b + 1] = first[b] + Width(s, (PetscInt)b);
   Elimination elimination(first.back());
@@ -263,25 +262,25 @@ std::vector<RowRef> Dependent(const SceneData &s, const std::vector<RowBlock> &b
     for (std::size_t k = 0; k < b.body.size(); k++)
       for (int c = b.column[k]; c < b.column[k + 1]; c++)
         if (b.J(core[j].row, c) != 0) row.emplace_back(first[b.body[k]] + c - b.column[k], b.J(core[j].row, c));
-    if (!elimination.take(row, threshold)) dead.push_back(j);
+    if (!elimination.add(row, threshold)) redundant.push_back(j);
   }
-  std::sort(dead.begin(), dead.end());
-  for (std::size_t k : dead) found.push_back(core[k]);
+  std::sort(redundant.begin(), redundant.end());
+  for (std::size_t k : redundant) found.push_back(core[k]);
   return found;
 }
 
-/* Redundant rows where the description puts the bodies */
-std::vector<RowRef> Find(SceneData &s, std::vector<RowBlock> &blocks)
+/* Redundant rows at the described poses */
+std::vector<RowRef> FindRedundant(SceneData &s, std::vector<RowBlock> &blocks)
 {
   Scale(s, blocks, LengthOfBodies(s));
   const std::vector<RowRef> core = Pruning(s, blocks).core();
   s.started.core                 = (PetscInt)core.size();
-  /* rows that are redundant are so to the accuracy to which the constraints are met */
+  /* dependences are as accurate as the constraints are satisfied */
   const double threshold = std::min(1e-5, std::max(rounding_of_descriptions, 100 * s.started.misfit));
   return Dependent(s, blocks, core, threshold);
 }
 
-/* Moves the bodies a little in a direction that the constraints allow; false if they allow none */
+/* Moves the bodies by neighbour_distance in a random direction that the constraints allow; *moved = false if they allow none */
 PetscErrorCode MoveAside(Model &M, const std::vector<RowBlock> &blocks, bool *moved)
 {
   SceneData                             &s    = M.scene;
@@ -292,7 +291,7 @@ PetscErrorCode MoveAside(Model &M, const std::vector<RowBlock> &blocks, bool *mo
   std::vector<double>                    from(6 * s.bodies.size(), 0), d, rhs;
   double                                 most = 0;
   PetscFunctionBegin;
-  for (std::size_t i = 0; i < s.bodies.size(); i++) /* none out of the plane of a planar scene */
+  for (std::size_t i = 0; i < s.bodies.size(); i++) /* only directions of motion, none out of the plane of a planar scene */
     for (int k : Directions(KindOf(s, s.bodies[i]))) from[6 * i + k] = uniform(random) * (k < 3 ? size : 1);
   for (const RowBlock &b : blocks) rhs.insert(rhs.end(), b.rows, 0.0);
   PetscCall(system.factor(blocks));
@@ -302,9 +301,9 @@ PetscErrorCode MoveAside(Model &M, const std::vector<RowBlock> &blocks, bool *mo
   if (!*moved) PetscFunctionReturn(0);
   for (std::size_t i = 0; i < s.bodies.size(); i++) {
     const Vector3 x(d[6 * i], d[6 * i + 1], d[6 * i + 2]), theta(d[6 * i + 3], d[6 * i + 4], d[6 * i + 5]);
-    s.bodies[i].r += neighbour / most * x;
+    s.bodies[i].r += neighbour_distance / most * x;
     if (theta.norm() > 0)
-      s.bodies[i].A = Eigen::AngleAxisd(neighbour / most * theta.norm(), theta.normalized()) * s.bodies[i].A;
+      s.bodies[i].A = Eigen::AngleAxisd(neighbour_distance / most * theta.norm(), theta.normalized()) * s.bodies[i].A;
   }
   PetscFunctionReturn(0);
 }
@@ -318,11 +317,11 @@ void SetActive(const std::vector<RowBlock> &blocks, const std::vector<RowRef> &r
   }
 }
 
-/* Largest misfit of rows where the bodies are, lengths in units of the scene's size */
+/* Largest violation of rows at the present poses, lengths in units of the scene's size */
 double LargestMisfit(const SceneData &s, const std::vector<RowRef> &rows)
 {
   const double                size   = SceneSize(s);
-  const std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None);
+  const std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, FixedBodies::None);
   double                      worst  = 0;
   for (const RowRef &f : rows) {
     const RowBlock &b = blocks[f.block];
@@ -332,35 +331,34 @@ double LargestMisfit(const SceneData &s, const std::vector<RowRef> &rows)
   return worst;
 }
 
-/* To a neighbouring position that all constraints are met at, but for those that flexible bodies have yet to deform for, redundant ones to less than what a start may be off.
-   Found without the redundant ones, which near a position that is not consistent contradict the others; where that
-   leads away from them, with them */
-PetscErrorCode Neighbour(Model &M, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &redundant,
-                         bool *moved, bool *ok)
+/* Moves the bodies to a neighbouring position that satisfies all constraints, except those that need deformations (LeftToDeform()); redundant ones to 1e-3 of the tolerance.
+   First without the redundant rows, which contradict the others near an inconsistent position; if they are violated then, with them */
+PetscErrorCode MoveToNeighbour(Model &M, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &redundant,
+                               bool *moved, bool *ok)
 {
   SceneData              &s      = M.scene;
   const std::vector<Pose> before = Poses(s);
-  const double            enough = 1e-3 * s.start.tolerance;
-  const std::vector<char> part   = LeftToDeform(s) ? RigidElements(s, Hold::None) : std::vector<char>(s.elements.size(), 1);
+  const double            target   = 1e-3 * s.start.tolerance;
+  const std::vector<char> elements = LeftToDeform(s) ? RigidElements(s, FixedBodies::None) : std::vector<char>(s.elements.size(), 1);
   PetscFunctionBegin;
   *ok = false;
-  PetscCall(MoveAside(M, DescribeAll(s, s.start.time, Hold::None), moved));
+  PetscCall(MoveAside(M, DescribeAll(s, s.start.time, FixedBodies::None), moved));
   if (!*moved) PetscFunctionReturn(0);
   const std::vector<Pose> aside = Poses(s);
   SetActive(blocks, redundant, false);
-  const PetscErrorCode failed = ProjectPositions(M, Hold::None, ok, &part);
+  const PetscErrorCode failed = ProjectPositions(M, FixedBodies::None, ok, &elements);
   SetActive(blocks, redundant, true);
   PetscCall(failed);
-  *ok = *ok && LargestMisfit(s, redundant) <= enough;
+  *ok = *ok && LargestMisfit(s, redundant) <= target;
   if (*ok) PetscFunctionReturn(0);
   SetPoses(s, aside);
-  PetscCall(ProjectPositions(M, Hold::None, ok, &part));
-  *ok = *ok && LargestMisfit(s, redundant) <= enough;
+  PetscCall(ProjectPositions(M, FixedBodies::None, ok, &elements));
+  *ok = *ok && LargestMisfit(s, redundant) <= target;
   if (!*ok) SetPoses(s, before);
   PetscFunctionReturn(0);
 }
 
-/* Takes the rows out of `found` that are independent next to the start */
+/* Removes rows from `found` that are independent at a neighbouring position */
 PetscErrorCode KeepSingular(Model &M, const std::vector<RowBlock> &blocks, std::vector<RowRef> &found)
 {
   SceneData              &s       = M.scene;
@@ -368,10 +366,10 @@ PetscErrorCode KeepSingular(Model &M, const std::vector<RowBlock> &blocks, std::
   const StartResult       started = s.started;
   bool                    moved = false, ok = false;
   PetscFunctionBegin;
-  PetscCall(Neighbour(M, blocks, found, &moved, &ok));
+  PetscCall(MoveToNeighbour(M, blocks, found, &moved, &ok));
   if (ok) {
-    std::vector<RowBlock>     there = DescribeAll(s, s.start.time, Hold::None, Modes::Free);
-    const std::vector<RowRef> next  = Find(s, there);
+    std::vector<RowBlock>     there = DescribeAll(s, s.start.time, FixedBodies::None, ModalColumns::Included);
+    const std::vector<RowRef> next  = FindRedundant(s, there);
     if (next.size() < found.size()) {
       PetscCall(PetscPrintf(
           s.comm,
@@ -395,18 +393,18 @@ PetscErrorCode KeepSingular(Model &M, const std::vector<RowBlock> &blocks, std::
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Tell(const SceneData &s, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &found)
+PetscErrorCode ReportRedundant(const SceneData &s, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &found)
 {
-  const std::size_t named = 5;
+  const std::size_t max_named = 5;
   std::string       list;
   PetscFunctionBegin;
   for (std::size_t k = 0; k < found.size(); k++) {
     const RowBlock   &b    = blocks[found[k].block];
     const std::string name = RowName(s, b.element, b.first + found[k].row, b.name);
-    if (k < named) list += "\n  " + name;
+    if (k < max_named) list += "\n  " + name;
     PetscCall(PetscInfo(nullptr, "scene: redundant: %s\n", name.c_str()));
   }
-  if (found.size() > named) list += "\n  and " + std::to_string(found.size() - named) + " more, see -info";
+  if (found.size() > max_named) list += "\n  and " + std::to_string(found.size() - max_named) + " more, see -info";
   PetscCheck(
       s.start.redundant == Redundant::Drop, s.comm, PETSC_ERR_ARG_WRONG,
       "%zu of %d constraints follow from the others:%s\nUse joints that leave more freedom, or -scene_redundant drop",
@@ -416,7 +414,7 @@ PetscErrorCode Tell(const SceneData &s, const std::vector<RowBlock> &blocks, con
   PetscFunctionReturn(0);
 }
 
-bool ReadsDropped(const SceneData &s, const ElementData &e)
+bool ReadsDroppedRow(const SceneData &s, const ElementData &e)
 {
   for (const Part &p : e.parts)
     for (int i = 0; i < p.store->inputs(); i++) {
@@ -428,12 +426,12 @@ bool ReadsDropped(const SceneData &s, const ElementData &e)
   return false;
 }
 
-/* Friction whose joint has lost rows finds no load there: the other joints carry it */
-PetscErrorCode TellReaders(const SceneData &s)
+/* Warns of friction elements that read the multiplier of a dropped row: it is zero, since other joints carry the load */
+PetscErrorCode WarnReaders(const SceneData &s)
 {
   PetscFunctionBegin;
   for (const ElementData &e : s.elements)
-    if (ReadsDropped(s, e))
+    if (ReadsDroppedRow(s, e))
       PetscCall(PetscPrintf(s.comm, "scene: %s %s takes the forces of dropped rows for zero: put it on the joint that is left to carry the load, or use joints that leave more freedom\n",
                             e.type, e.name.c_str()));
   PetscFunctionReturn(0);
@@ -444,7 +442,7 @@ PetscErrorCode TellReaders(const SceneData &s)
 PetscErrorCode DropRedundant(Model &M)
 {
   SceneData            &s      = M.scene;
-  std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, Hold::None, Modes::Free);
+  std::vector<RowBlock> blocks = DescribeAll(s, s.start.time, FixedBodies::None, ModalColumns::Included);
   PetscFunctionBegin;
   s.started.coordinates = s.started.rows = s.started.redundant = 0;
   s.started.dropped.clear();
@@ -458,17 +456,17 @@ PetscErrorCode DropRedundant(Model &M)
   for (const RowBlock &b : blocks)
     for (int r = 0; r < b.rows && !b.store->isExplicit(); r++) s.started.rows += b.has(r);
   if (s.start.redundant == Redundant::Keep) PetscFunctionReturn(0);
-  std::vector<RowRef> found = Find(s, blocks);
+  std::vector<RowRef> found = FindRedundant(s, blocks);
   if (!found.empty()) PetscCall(KeepSingular(M, blocks, found));
   s.started.redundant = (PetscInt)found.size();
   if (found.empty()) PetscFunctionReturn(0);
-  PetscCall(Tell(s, blocks, found));
+  PetscCall(ReportRedundant(s, blocks, found));
   for (const RowRef &f : found) {
     const RowBlock &b = blocks[f.block];
     b.store->setActive(b.instance, (unsigned char)(b.store->active(b.instance) & ~(1u << f.row)));
     s.started.dropped.push_back({b.element, b.first + f.row});
   }
-  PetscCall(TellReaders(s));
+  PetscCall(WarnReaders(s));
   PetscFunctionReturn(0);
 }
 

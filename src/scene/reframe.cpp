@@ -1,13 +1,13 @@
 /*
-  What rotational coordinates refer to. Local rotation vectors count from the attitude at the last accepted step: the integrator tells where
-  that is, TSHHT3SetRotations().
+  Reference attitudes of rotational coordinates. Local rotation vectors refer to the attitude at the last accepted step, which the integrator
+  reports, TSHHT3SetRotations().
 
-  Of Euler angles, a body whose theta comes near 0 or pi gets new axes: they then belong to another frame fixed in the body, in which it
-  is far from the singularity. The integrator carries angles, rates, accelerations and their history over, TSHHT3SetCoordinateChange(). The
-  same call before each step tells that the state has been accepted, and angles that are counted over full turns remember where they are.
+  With Euler angles, a body whose theta comes near 0 or pi gets new axes: the angles then describe another body-fixed frame, which
+  is far from the singularity. The integrator transforms angles, rates, accelerations and their history, TSHHT3SetCoordinateChange(). Its
+  test before each step also reports that the state has been accepted: memories, such as angles over full turns, are updated then.
 
-  References and remembered angles are in one vector, Runtime::axes, which checkpoints keep: the quaternion of LocalBody::C per own rigid
-  body, then the memories of the elements.
+  References and memories are in one vector, Runtime::axes, which is part of checkpoints: the quaternion of LocalBody::C of each own
+  body, the memories of the elements, and the numbers of kept.cpp.
 */
 #include "runtime.h"
 
@@ -17,9 +17,9 @@ namespace hhtdae
 namespace
 {
 
-bool HasAxes(const LocalBody &k) { return TurnsInSpace(k.kind); }
+bool RotatesInSpace(const LocalBody &k) { return TurnsInSpace(k.kind); }
 
-void Store(const Eigen::Quaterniond &q, double *x)
+void StoreQuaternion(const Eigen::Quaterniond &q, double *x)
 {
   x[0] = q.w();
   x[1] = q.x();
@@ -27,10 +27,10 @@ void Store(const Eigen::Quaterniond &q, double *x)
   x[3] = q.z();
 }
 
-Matrix3 Load(const double *x) { return Eigen::Quaterniond(x[0], x[1], x[2], x[3]).normalized().toRotationMatrix(); }
+Matrix3 LoadQuaternion(const double *x) { return Eigen::Quaterniond(x[0], x[1], x[2], x[3]).normalized().toRotationMatrix(); }
 
-/* Leaves: others' rigid bodies here; roots: own bodies of their owners */
-PetscErrorCode MakeExchange(Runtime &R)
+/* PetscSF: leaves are the other ranks' bodies on this rank, roots the own bodies of their owners */
+PetscErrorCode MakeAxesExchange(Runtime &R)
 {
   std::vector<PetscInt>   place(R.scene.bodies.size()), next(R.size, 0);
   std::vector<PetscSFNode> root;
@@ -48,20 +48,20 @@ PetscErrorCode MakeExchange(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* Own bodies that need other axes, and which */
-PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
+/* Finds own bodies near the singularity, and their new axes */
+PetscErrorCode ChooseNewAxes(Runtime &R, Vec U, Vec V)
 {
   const double *u, *v;
   PetscFunctionBegin;
   R.next_body.clear();
   R.next_axes.clear();
-  R.changing = false;
-  if (!R.turns || R.bodies.local) PetscFunctionReturn(0);
+  R.changing_axes = false;
+  if (!R.rotates_in_space || R.bodies.local) PetscFunctionReturn(0);
   PetscCall(VecGetArrayRead(U, &u));
   PetscCall(VecGetArrayRead(V, &v));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
-    if (!HasAxes(k)) continue;
+    if (!RotatesInSpace(k)) continue;
     const double *eps = u + k.first + 3, *rate = v + k.first + 3;
     if (std::abs(std::sin(eps[1])) >= singular_sine) continue;
     Matrix3   A;
@@ -74,11 +74,11 @@ PetscErrorCode ChooseNext(Runtime &R, Vec U, Vec V)
   PetscCall(VecRestoreArrayRead(V, &v));
   int any = !R.next_body.empty();
   if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, R.scene.comm));
-  R.changing = any;
+  R.changing_axes = any;
   PetscFunctionReturn(0);
 }
 
-/* Axes and memories go forward in time */
+/* References and memories cannot go back in time */
 PetscErrorCode CheckTime(Runtime &R, PetscReal t)
 {
   PetscFunctionBegin;
@@ -90,7 +90,7 @@ PetscErrorCode CheckTime(Runtime &R, PetscReal t)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *ctx)
+PetscErrorCode TestAxes(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *ctx)
 {
   Runtime &R = *static_cast<Runtime *>(ctx);
   PetscFunctionBegin;
@@ -99,12 +99,12 @@ PetscErrorCode Test(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *c
   PetscCall(AngleTolerances(R, ts));
   PetscCall(Remember(R, U, V));
   PetscCall(CheckDropped(R, t, U, V));
-  PetscCall(ChooseNext(R, U, V));
-  *change = R.changing ? PETSC_TRUE : PETSC_FALSE;
+  PetscCall(ChooseNewAxes(R, U, V));
+  *change = R.changing_axes ? PETSC_TRUE : PETSC_FALSE;
   PetscFunctionReturn(0);
 }
 
-/* The same attitude, angular velocity and acceleration in other axes; eps'' also when it is not quite at the time of eps */
+/* Transforms angles eps, rates and accelerations to new axes, at the same attitude, angular velocity and acceleration */
 void MapBody(const Matrix3 &C, const Matrix3 &next, double *eps, double *rate, double *acc)
 {
   Matrix3   A;
@@ -122,7 +122,7 @@ void MapBody(const Matrix3 &C, const Matrix3 &next, double *eps, double *rate, d
   }
 }
 
-PetscErrorCode Map(TS, PetscReal, Vec U, Vec V, Vec A, void *ctx)
+PetscErrorCode MapToNewAxes(TS, PetscReal, Vec U, Vec V, Vec A, void *ctx)
 {
   Runtime &R = *static_cast<Runtime *>(ctx);
   double  *u, *v, *a;
@@ -140,8 +140,8 @@ PetscErrorCode Map(TS, PetscReal, Vec U, Vec V, Vec A, void *ctx)
   PetscFunctionReturn(0);
 }
 
-/* A checkpoint has been loaded: the tolerances as the run had set them in its first step, and the rest of the vector */
-PetscErrorCode Resume(Runtime &R, TS ts)
+/* After a checkpoint has been loaded: sets the tolerances of angles, which a run sets in its first step, and reads the end of the vector */
+PetscErrorCode ResumeFromCheckpoint(Runtime &R, TS ts)
 {
   double *x;
   PetscFunctionBegin;
@@ -153,29 +153,29 @@ PetscErrorCode Resume(Runtime &R, TS ts)
   PetscFunctionReturn(0);
 }
 
-/* New axes into the vector, and from it to where they are used; also after a checkpoint has been loaded */
-PetscErrorCode Commit(TS ts, void *ctx)
+/* Stores new axes in the vector and copies references and memories from it; also called after a checkpoint has been loaded */
+PetscErrorCode CommitAxes(TS ts, void *ctx)
 {
   Runtime &R = *static_cast<Runtime *>(ctx);
   double  *x;
   PetscFunctionBegin;
   PetscCall(VecGetArray(R.axes, &x));
   for (std::size_t i = 0; i < R.next_body.size(); i++) {
-    Store(Eigen::Quaterniond(R.next_axes[i]), x + 4 * R.next_body[i]);
+    StoreQuaternion(Eigen::Quaterniond(R.next_axes[i]), x + 4 * R.next_body[i]);
     PetscCall(PetscInfo(ts, "new axes for the Euler angles of %s\n", R.scene.bodyName(R.bodies.body[R.next_body[i]].id).c_str()));
   }
   PetscCall(VecRestoreArray(R.axes, &x));
-  if (R.next_body.empty()) R.accepted = PETSC_NINFINITY; /* a checkpoint, of any time */
-  R.reframed += (PetscInt)R.next_body.size();
+  if (R.next_body.empty()) R.accepted = PETSC_NINFINITY; /* a checkpoint has been loaded, of any time */
+  R.axes_changes += (PetscInt)R.next_body.size();
   R.next_body.clear();
   R.next_axes.clear();
   PetscCall(UseAxes(R));
-  if (!R.changing) PetscCall(Resume(R, ts));
-  R.changing = false;
+  if (!R.changing_axes) PetscCall(ResumeFromCheckpoint(R, ts));
+  R.changing_axes = false;
   PetscFunctionReturn(0);
 }
 
-/* Others' bodies refer to what their owners say */
+/* Sends the references of own bodies to the other ranks that have them */
 PetscErrorCode ExchangeReferences(Runtime &R, const double *own)
 {
   std::vector<double> other(4 * (R.bodies.body.size() - R.bodies.own));
@@ -189,12 +189,12 @@ PetscErrorCode ExchangeReferences(Runtime &R, const double *own)
     PetscCallMPI(MPI_Type_free(&quaternion));
   }
   for (PetscInt b = 0; b + 1 < (PetscInt)R.bodies.body.size(); b++)
-    if (HasAxes(R.bodies.body[b])) R.bodies.body[b].C = Load(b < R.bodies.own ? own + 4 * b : other.data() + 4 * (b - R.bodies.own));
+    if (RotatesInSpace(R.bodies.body[b])) R.bodies.body[b].C = LoadQuaternion(b < R.bodies.own ? own + 4 * b : other.data() + 4 * (b - R.bodies.own));
   PetscFunctionReturn(0);
 }
 
-/* Local rotation vectors count from where U is */
-PetscErrorCode Refer(Runtime &R, Vec U)
+/* Takes the attitudes in U as references of local rotation vectors, which become zero */
+PetscErrorCode UpdateReferences(Runtime &R, Vec U)
 {
   double *u, *x;
   PetscFunctionBegin;
@@ -203,9 +203,9 @@ PetscErrorCode Refer(Runtime &R, Vec U)
   R.reference_before.assign(x, x + 4 * R.bodies.own);
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
-    if (!HasAxes(k)) continue;
+    if (!RotatesInSpace(k)) continue;
     double *turn = u + k.first + 3, *q = x + 4 * b;
-    Store((LocalTurn(Vector3(turn[0], turn[1], turn[2])) * Eigen::Quaterniond(q[0], q[1], q[2], q[3])).normalized(), q);
+    StoreQuaternion((LocalTurn(Vector3(turn[0], turn[1], turn[2])) * Eigen::Quaterniond(q[0], q[1], q[2], q[3])).normalized(), q);
     std::fill(turn, turn + 3, 0.0);
   }
   PetscCall(ExchangeReferences(R, x));
@@ -214,14 +214,14 @@ PetscErrorCode Refer(Runtime &R, Vec U)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode ReferTo(TS, Vec U, void *ctx)
+PetscErrorCode UpdateReferencesOfTS(TS, Vec U, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(Refer(*static_cast<Runtime *>(ctx), U));
+  PetscCall(UpdateReferences(*static_cast<Runtime *>(ctx), U));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode ReferBack(TS, void *ctx)
+PetscErrorCode RestoreReferences(TS, void *ctx)
 {
   Runtime &R = *static_cast<Runtime *>(ctx);
   double  *x;
@@ -242,13 +242,13 @@ PetscErrorCode RotationVectors(Runtime &R, TS ts, IS *is)
   PetscCall(TSGetSolution(ts, &U));
   PetscCall(VecGetOwnershipRange(U, &first, nullptr));
   for (PetscInt b = 0; b < R.bodies.own; b++)
-    if (HasAxes(R.bodies.body[b])) at.push_back(first + R.bodies.body[b].first + 3);
+    if (RotatesInSpace(R.bodies.body[b])) at.push_back(first + R.bodies.body[b].first + 3);
   PetscCall(ISCreateGeneral(R.scene.comm, (PetscInt)at.size(), at.data(), PETSC_COPY_VALUES, is));
   PetscFunctionReturn(0);
 }
 
-/* Before a checkpoint is written */
-PetscErrorCode Prepare(TS ts)
+/* Completes the vector before a checkpoint is written */
+PetscErrorCode PrepareCheckpoint(TS ts)
 {
   void *ctx;
   PetscFunctionBegin;
@@ -274,7 +274,7 @@ void CopyMemories(Runtime &R, double *x, bool in)
   }
 }
 
-/* Motion of the bodies in the state (U, V), with others' bodies */
+/* Moves the bodies of this rank, also those of other owners, to the state (U, V) */
 PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V)
 {
   const double *u, *v, *local[3];
@@ -288,41 +288,41 @@ PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* Elements and questions remember the accepted state */
+/* Updates memories of elements and queried angles at an accepted state */
 PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
 {
   const double *u;
   PetscFunctionBegin;
-  R.accepts++;
+  R.accepted_states++;
   R.step_parameters = ParametersNow(R.scene);
-  if (!R.remembers && R.asked.empty()) PetscFunctionReturn(0);
+  if (!R.has_memory && R.queried_angles.empty()) PetscFunctionReturn(0);
   PetscCall(MoveBodies(R, U, V));
-  R.moved = R.bodies.local ? R.bodies.moves : -1;
+  R.accepted_move = R.bodies.local ? R.bodies.moves : -1;
   for (auto &b : R.batches) b->accept(R.bodies);
   PetscCall(KeepMemories(R));
   PetscCall(VecGetArrayRead(U, &u));
-  PetscCall(CountAngles(R, u, R.asked));
+  PetscCall(CountAngles(R, u, R.queried_angles));
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscFunctionReturn(0);
 }
 
-/* Before a run has begun: new axes for the bodies that need them, at the same attitudes and angular velocities */
+/* Before a run has begun: new references or axes at the same attitudes and angular velocities */
 PetscErrorCode RenewAxes(Runtime &R, Vec U, Vec V)
 {
   Vec A;
   PetscFunctionBegin;
-  if (R.turns && R.bodies.local) PetscCall(Refer(R, U));
-  PetscCall(ChooseNext(R, U, V));
-  if (!R.changing) PetscFunctionReturn(0);
+  if (R.rotates_in_space && R.bodies.local) PetscCall(UpdateReferences(R, U));
+  PetscCall(ChooseNewAxes(R, U, V));
+  if (!R.changing_axes) PetscFunctionReturn(0);
   PetscCall(VecDuplicate(U, &A));
   PetscCall(VecZeroEntries(A));
-  PetscCall(Map(nullptr, 0, U, V, A, &R));
+  PetscCall(MapToNewAxes(nullptr, 0, U, V, A, &R));
   PetscCall(VecDestroy(&A));
-  PetscCall(Commit(nullptr, &R));
+  PetscCall(CommitAxes(nullptr, &R));
   PetscFunctionReturn(0);
 }
 
-/* What elements remember into the vector that checkpoints keep */
+/* Copies memories of elements into the checkpoint vector */
 PetscErrorCode KeepMemories(Runtime &R)
 {
   double *x;
@@ -333,35 +333,35 @@ PetscErrorCode KeepMemories(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* Makes the vector, with the axes that the initial attitudes and angular velocities choose */
+/* Creates the vector, with axes chosen by the initial attitudes and angular velocities */
 PetscErrorCode MakeAxes(Runtime &R)
 {
   double *x;
   int     local[2] = {0, Memories(R) > 0}, global[2];
   PetscFunctionBegin;
-  for (PetscInt b = 0; b < R.bodies.own; b++) local[0] |= HasAxes(R.bodies.body[b]);
+  for (PetscInt b = 0; b < R.bodies.own; b++) local[0] |= RotatesInSpace(R.bodies.body[b]);
   PetscCallMPI(MPI_Allreduce(local, global, 2, MPI_INT, MPI_MAX, R.scene.comm));
-  R.turns     = global[0];
-  R.remembers = global[1];
+  R.rotates_in_space = global[0];
+  R.has_memory       = global[1];
   PetscCall(VecCreate(R.scene.comm, &R.axes));
   PetscCall(VecSetSizes(R.axes, 4 * R.bodies.own + Memories(R) + Kept(R), PETSC_DETERMINE));
   PetscCall(VecSetType(R.axes, VECSTANDARD));
-  if (R.size > 1) PetscCall(MakeExchange(R));
+  if (R.size > 1) PetscCall(MakeAxesExchange(R));
   PetscCall(VecGetArray(R.axes, &x));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const BodyData &d = R.scene.bodies[R.bodies.body[b].id];
     Matrix3         C = Matrix3::Identity();
-    if (HasAxes(R.bodies.body[b])) C = R.bodies.local ? d.A : ChooseAxes(d.A, d.w);
-    Store(Eigen::Quaterniond(C), x + 4 * b);
+    if (RotatesInSpace(R.bodies.body[b])) C = R.bodies.local ? d.A : ChooseAxes(d.A, d.w);
+    StoreQuaternion(Eigen::Quaterniond(C), x + 4 * b);
   }
   PetscCall(VecRestoreArray(R.axes, &x));
-  if ((PetscInt)R.model->turned.size() == Memories(R)) CopyMemories(R, const_cast<double *>(R.model->turned.data()), true);
+  if ((PetscInt)R.model->start_memories.size() == Memories(R)) CopyMemories(R, const_cast<double *>(R.model->start_memories.data()), true);
   PetscCall(KeepMemories(R));
   PetscCall(UseAxes(R));
   PetscFunctionReturn(0);
 }
 
-/* Axes and memories as the vector has them */
+/* Copies references and memories from the vector */
 PetscErrorCode UseAxes(Runtime &R)
 {
   double *x;
@@ -389,15 +389,15 @@ static PetscErrorCode ToleranceOfAngles(const Runtime &R, Vec U, double whole, d
   PetscFunctionReturn(0);
 }
 
-/* Angles are measured against atol alone, or a tolerance of their own: their values depend on the axes and grow with every turn, while an error of an
-   angle does not. */
+/* Angles get an absolute tolerance only, atol or -scene_angle_tol: relative to their values, which depend on the axes and grow with every turn, the tolerance would change although the
+   effect of an error does not */
 PetscErrorCode AngleTolerances(Runtime &R, TS ts)
 {
   PetscReal atol, rtol;
   Vec       vatol, vrtol, U;
   PetscFunctionBegin;
   PetscCall(TSGetTolerances(ts, &atol, &vatol, &rtol, &vrtol));
-  if ((vatol && vatol != R.tolerance[0]) || (vrtol && vrtol != R.tolerance[1])) { /* the user's own, by the largest of which dropped rows are judged */
+  if ((vatol && vatol != R.tolerance[0]) || (vrtol && vrtol != R.tolerance[1])) { /* tolerances set by the user; dropped rows use the largest */
     R.tolerance_of[0] = atol;
     R.tolerance_of[1] = rtol;
     if (R.dropped && vatol) PetscCall(VecMax(vatol, nullptr, &R.tolerance_of[0]));
@@ -416,14 +416,14 @@ PetscErrorCode AngleTolerances(Runtime &R, TS ts)
 PetscErrorCode AttachReframing(Runtime &R, TS ts)
 {
   PetscFunctionBegin;
-  const bool local = R.turns && R.bodies.local;
+  const bool local = R.rotates_in_space && R.bodies.local;
   IS         is    = nullptr;
-  PetscCall(TSHHT3SetCoordinateChange(ts, Test, R.turns && !local ? Map : nullptr, Commit, &R));
+  PetscCall(TSHHT3SetCoordinateChange(ts, TestAxes, R.rotates_in_space && !local ? MapToNewAxes : nullptr, CommitAxes, &R));
   if (local) PetscCall(RotationVectors(R, ts, &is));
-  PetscCall(TSHHT3SetRotations(ts, is, local ? ReferTo : nullptr, local ? ReferBack : nullptr, &R));
+  PetscCall(TSHHT3SetRotations(ts, is, local ? UpdateReferencesOfTS : nullptr, local ? RestoreReferences : nullptr, &R));
   PetscCall(ISDestroy(&is));
   PetscCall(TSHHT3SetCheckpointVec(ts, R.axes));
-  PetscCall(PetscObjectComposeFunction((PetscObject)ts, "TSHHT3CheckpointPrepare_C", Prepare));
+  PetscCall(PetscObjectComposeFunction((PetscObject)ts, "TSHHT3CheckpointPrepare_C", PrepareCheckpoint));
   PetscFunctionReturn(0);
 }
 

@@ -1,4 +1,4 @@
-/* All constraint rows of a scene where its description puts the bodies. */
+/* All constraint rows of a scene at the described poses, and lengths to which their violations are related. */
 #include "start.h"
 #include <algorithm>
 #include <numeric>
@@ -28,11 +28,11 @@ const std::vector<int> &Directions(BodyKind k)
 namespace
 {
 
-void AddColumns(const SceneData &s, RowBlock &b, const DescribedRows &d, int k, PetscInt marker, Modes modes)
+void AddColumns(const SceneData &s, RowBlock &b, const DescribedRows &d, int k, PetscInt marker, ModalColumns modes)
 {
   const MarkerData &m  = s.markers[marker];
   const std::size_t at = std::find(b.body.begin(), b.body.end(), m.body) - b.body.begin();
-  if (at == b.body.size()) return; /* it cannot move */
+  if (at == b.body.size()) return; /* the body is fixed */
   const BodyData         &body      = s.bodies[m.body];
   const Vector3           lever     = body.A * m.s;
   const std::vector<int> &direction = Directions(KindOf(s, body));
@@ -42,32 +42,32 @@ void AddColumns(const SceneData &s, RowBlock &b, const DescribedRows &d, int k, 
     full << x, theta + lever.cross(x); /* dx = dr + dtheta x lever */
     for (std::size_t c = 0; c < direction.size(); c++) b.J(r, b.column[at] + (int)c) += full(direction[c]);
   }
-  if (k == 0 && modes == Modes::Free && d.modal.size())
+  if (k == 0 && modes == ModalColumns::Included && d.modal.size())
     b.J.middleCols(b.column[at] + (int)direction.size(), d.modal.cols()) += d.modal;
 }
 
-bool Holds(Hold hold, const BodyData &b)
+bool IsFixed(FixedBodies fixed_bodies, const BodyData &b)
 {
   const bool of_nodes = b.massless && b.carrier < 0;
-  return b.fixed_start && (hold == Hold::FixedStart || (hold == Hold::Nodes && of_nodes));
+  return b.fixed_start && (fixed_bodies == FixedBodies::FixedStart || (fixed_bodies == FixedBodies::Nodes && of_nodes));
 }
 
-/* The bodies that can move, and where their columns begin */
-void FindBodies(const SceneData &s, const StoreBase &store, PetscInt e, Hold hold, Modes modes, RowBlock &b)
+/* Movable bodies of an instance, and their first columns */
+void FindBodies(const SceneData &s, const StoreBase &store, PetscInt e, FixedBodies fixed_bodies, ModalColumns modes, RowBlock &b)
 {
   int columns = 0;
   for (int k = 0; k < store.markers(); k++) {
     const PetscInt id = s.markers[store.marker(e, k)].body;
-    if (id < 0 || Holds(hold, s.bodies[id])) continue;
+    if (id < 0 || IsFixed(fixed_bodies, s.bodies[id])) continue;
     if (std::find(b.body.begin(), b.body.end(), id) != b.body.end()) continue;
     b.body.push_back(id);
     b.column.push_back(columns);
-    columns += modes == Modes::Free ? Width(s, id) : (int)Directions(KindOf(s, s.bodies[id])).size();
+    columns += modes == ModalColumns::Included ? Width(s, id) : (int)Directions(KindOf(s, s.bodies[id])).size();
   }
   b.column.push_back(columns);
 }
 
-/* Phi_q q' + Phi_t, whoever is held */
+/* b.speed = Phi_q q' + Phi_t, of all bodies, also fixed ones */
 void Speeds(const SceneData &s, const DescribedRows &d, RowBlock &b)
 {
   b.speed = b.rate;
@@ -89,7 +89,7 @@ int Width(const SceneData &s, PetscInt b)
   return (int)Directions(KindOf(s, body)).size() + (body.flexible ? (int)body.flexible->model->modes() : 0);
 }
 
-std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold, Modes modes)
+std::vector<RowBlock> DescribeAll(const SceneData &s, double t, FixedBodies fixed_bodies, ModalColumns modes)
 {
   std::vector<RowBlock> all;
   DescribedRows         d;
@@ -112,7 +112,7 @@ std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold, Modes
       b.length = d.length;
       b.value  = Eigen::Map<const Eigen::VectorXd>(d.value, b.rows);
       b.rate   = Eigen::Map<const Eigen::VectorXd>(d.rate, b.rows);
-      FindBodies(s, *p.store, p.index, hold, modes, b);
+      FindBodies(s, *p.store, p.index, fixed_bodies, modes, b);
       b.J.setZero(b.rows, b.column.back());
       for (int k = 0; k < p.store->markers(); k++) AddColumns(s, b, d, k, p.store->marker(p.index, k), modes);
       for (int r = 0; r < b.rows; r++)
@@ -134,8 +134,8 @@ double SceneSize(const SceneData &s)
   return size > 0 ? size : 1;
 }
 
-/* What hangs by nothing, however far away, does not blunt a check of joints, nor do markers that only measure; SceneAssembly.FarMarkersAndBodies. At least 1e-5 of
-   the coordinates, to which rounding leaves 1e-11 of it. */
+/* Unlike SceneSize() it excludes bodies without joints and markers used only for measures, which may be far away and would loosen the check of joints
+   (SceneAssembly.FarMarkersAndBodies). It is at least 1e-5 of the largest distance from the origin, whose rounding is then 1e-11 of it. */
 double MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks)
 {
   std::vector<PetscInt>           root(s.bodies.size());

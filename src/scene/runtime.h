@@ -15,11 +15,11 @@ struct DroppedRows; /* dropped_rows.cpp */
 struct Recorder;    /* output/recorder.h */
 struct ChannelWork; /* output/channels.h */
 
-/* An angle that a question has asked for, over full turns, at the last accepted step or where it was asked for first */
+/* An angle between two markers that a query has asked for, over full turns, at the last accepted step or at the first query */
 struct CountedAngle {
   PetscInt i, j; /* markers, in the scene */
   double   angle;
-  double   turned; /* planar scenes: by the bodies' own angles, which count turns whatever the length of a step */
+  double   turned; /* planar scenes: difference of the bodies' own angles, which count turns whatever the length of a step */
 };
 
 struct Runtime {
@@ -34,45 +34,45 @@ struct Runtime {
   Projection                          projection; /* of the matrix, from attachments' frames */
   std::vector<std::unique_ptr<Batch>> batches;
   std::vector<Slot>                   body_slot; /* diagonal blocks of own bodies, group by group; all nine of a flexible one */
-  std::vector<PetscInt>               local_body; /* of bodies in the scene, -1: not here */
-  bool                                uses_acceleration = false; /* somebody reads q'' of other bodies */
+  std::vector<PetscInt>               local_body;                /* local numbers of the scene's bodies, -1: not on this rank */
+  bool                                uses_acceleration = false; /* an element reads accelerations */
 
-  /* exchange: values of others' unknowns; packs (u, v) or (u, v, a) */
+  /* exchange of unknowns between ranks: (u, v) or (u, v, a) of each */
   PetscSF                sf = nullptr;
   MPI_Datatype           unit = MPI_DATATYPE_NULL;
-  std::vector<PetscInt>  boundary; /* own unknowns that others read */
-  std::vector<PetscInt>  others;   /* global numbers of others' unknowns, sorted */
+  std::vector<PetscInt>  boundary; /* own unknowns that other ranks read */
+  std::vector<PetscInt>  others;   /* global numbers of other ranks' unknowns that this rank reads, sorted */
   std::vector<double>    send, receive;
-  std::vector<double>    u, v, a; /* local unknowns, where there are others */
+  std::vector<double>    u, v, a; /* own unknowns, then those of `others`; empty on one rank */
 
   Mat  J = nullptr;
   IS   roles[TSHHT3_NUM_ROLES] = {};
-  Vec  axes = nullptr;   /* what a checkpoint has to keep: quaternions of the axes of own rigid bodies, memories, and as kept.cpp says */
-  bool changing = false; /* between the test that asked for other axes and their commit */
-  bool turns = false, remembers = false; /* on any rank: rigid bodies in space, elements with memory */
-  Vec       tolerance[2] = {}; /* absolute and relative: angles have their own, and none; those of all others, below */
-  PetscReal tolerance_of[2] = {-1, -1};
-  PetscSF axes_sf = nullptr; /* axes of others' bodies */
-  /* Not begun, but analyses have found accelerations, and multipliers, for this state: u, u', u'' at a time */
+  Vec       axes                    = nullptr;            /* data for checkpoints: quaternions of the axes of own bodies, memories of elements, the numbers of kept.cpp */
+  bool      changing_axes           = false;              /* between the test that has requested new axes and their commit */
+  bool      rotates_in_space = false, has_memory = false; /* on any rank: bodies with rotations in space; elements with memory of accepted steps */
+  Vec       tolerance[2]    = {};                         /* absolute and relative, by unknowns: angles have an absolute one of their own and no relative one */
+  PetscReal tolerance_of[2] = {-1, -1};                   /* absolute and relative, of all other unknowns */
+  PetscSF   axes_sf         = nullptr;                    /* exchange of the axes of other ranks' bodies */
+  /* Before the first step: u, u', u'' with the accelerations and multipliers that an analysis has found, and its time */
   Vec       start_state[3] = {};
   PetscReal start_time     = 0;
-  std::vector<double> start_parameters; /* values then, which functions read */
-  std::vector<double> step_parameters; /* values when the last step began */
+  std::vector<double>   start_parameters;                        /* values of the scene's parameters at that time */
+  std::vector<double>   step_parameters;                         /* values of the scene's parameters at the beginning of the last step */
   PetscReal           accepted = PETSC_NINFINITY;         /* time of the state that axes and memories belong to */
-  bool                  steps_limited = false; /* some element says how long a step may be */
-  std::vector<double>   reference_before; /* of local rotations, own bodies: quaternions */
-  std::vector<Matrix3>  next_axes; /* chosen for bodies that near the singularity, see reframe.cpp */
+  bool                  steps_limited = false;                   /* an element limits the step size, on any rank */
+  std::vector<double>   reference_before;                        /* previous reference attitudes of own bodies' local rotations: quaternions */
+  std::vector<Matrix3>  next_axes;                               /* new axes of bodies near the singularity of Euler angles, see reframe.cpp */
   std::vector<PetscInt> next_body;
-  PetscInt              reframed = 0; /* changes of axes so far, own bodies */
+  PetscInt              axes_changes = 0; /* number of changes of axes so far, own bodies */
 
-  std::map<std::pair<const StoreBase *, PetscInt>, std::unique_ptr<Probe>> readers; /* of parts of elements that were asked for, ReaderOf() */
-  std::vector<CountedAngle>    asked;
-  long                         accepts  = 0; /* accepted states that `asked` and the memories have seen */
-  PetscInt                     followed = 0; /* steps of a TS of another type among them */
-  long                         moved = -1;  /* which move of the bodies was to the last of them; -1: none, or in other axes */
-  std::shared_ptr<DroppedRows> dropped;     /* none unless rows were dropped as redundant, on any rank */
+  std::map<std::pair<const StoreBase *, PetscInt>, std::unique_ptr<Probe>> readers; /* probes of queried parts of elements, ReaderOf() */
+  std::vector<CountedAngle>                                                queried_angles;
+  long                                                                     accepted_states = 0;  /* number of accepted states so far */
+  PetscInt                                                                 followed_steps  = 0;  /* step number of the last one from a TS of another type, ts.cpp */
+  long                                                                     accepted_move   = -1; /* value of Bodies::moves when the bodies were moved to the last accepted state; -1: never, or axes may have changed since */
+  std::shared_ptr<DroppedRows>                                             dropped;              /* null unless rows were dropped as redundant, on any rank */
   std::shared_ptr<ChannelWork> channels;
-  std::shared_ptr<Recorder>    recorder; /* none unless output was asked for */
+  std::shared_ptr<Recorder>                                                recorder; /* null without output */
 
   explicit Runtime(std::shared_ptr<const Model> m)
       : model(std::move(m)), scene(model->scene), number(model->number), rank(model->rank), size(model->size), n(model->n), start(model->start)
@@ -94,44 +94,44 @@ inline Runtime       *RunOf(TS ts)
 }
 /* layout.cpp: this rank's bodies, markers, batches, pattern, exchange */
 PetscErrorCode Layout(Runtime &R);
-Probe         &ReaderOf(Runtime &R, const Part &p); /* on the rank that has it */
-PetscErrorCode RolesOf(const Runtime &R, std::vector<unsigned char> &role); /* of own unknowns */
-/* initial.cpp: state of the description, with what rotations count from chosen by it */
+Probe         &ReaderOf(Runtime &R, const Part &p);                         /* on the owner of the part */
+PetscErrorCode RolesOf(const Runtime &R, std::vector<unsigned char> &role); /* TSHHT3Role of own unknowns */
+/* initial.cpp: the described state as unknowns of the run */
 PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
-/* evaluate.cpp */
+/* evaluate.cpp. NoteBeginning(): stores the angular velocities of V, those at the beginning of the step whose matrix is computed next */
 PetscErrorCode NoteBeginning(Runtime &R, Vec V);
 PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const double *a, const double *local[3]);
-/* with accelerations even where no element reads them, which the exchange then leaves out; room: for those of others */
+/* like LocalState(), but with other ranks' accelerations even if no element reads them; room: storage for these */
 PetscErrorCode LocalMotion(Runtime &R, const double *u, const double *v, const double *a, std::vector<double> &room, const double *local[3]);
 PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, double sa, Mat J);
-/* reframe.cpp: change of the axes of the Euler angles in the course of a run */
+/* reframe.cpp: reference attitudes of local rotations, axes of Euler angles, memories of accepted steps */
 PetscErrorCode AttachReframing(Runtime &R, TS ts);
 PetscErrorCode MakeAxes(Runtime &R);
 PetscErrorCode UseAxes(Runtime &R);
 PetscErrorCode KeepMemories(Runtime &R);
-PetscInt       Memories(const Runtime &R); /* numbers that elements and functions of this rank remember of accepted steps */
-void           CopyMemories(Runtime &R, double *x, bool in); /* out to x, or in from it */
+PetscInt       Memories(const Runtime &R);                   /* number of values that this rank's elements and functions store of accepted steps */
+void           CopyMemories(Runtime &R, double *x, bool in); /* in: from x, else to x */
 PetscErrorCode Remember(Runtime &R, Vec U, Vec V);
 PetscErrorCode RenewAxes(Runtime &R, Vec U, Vec V);
 PetscErrorCode AngleTolerances(Runtime &R, TS ts);
-/* counted_angles.cpp: the angles at the state where the bodies have been moved to, which u is the own unknowns of; one more of them: its
-   turns are those that a spring, a motion, a channel count, or in a planar scene those from the start, else it is in (-pi, pi]. Collective */
+/* counted_angles.cpp. CountAngles(): the angles at the present state of the bodies; u: its own unknowns. FirstAngle(): an angle that is queried for the first time. It has the full turns
+   that a spring, a motion or a channel counts, in a planar scene those from the start, else it is in (-pi, pi]. Collective */
 PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<CountedAngle> &all);
-double StartAngle(const Model &M, Marker i, Marker j); /* of assembly and equilibrium too: less than half a turn from how the bodies are described */
+double         StartAngle(const Model &M, Marker i, Marker j); /* after assembly and equilibrium, less than half a turn from the angle of the description, which is in (-pi, pi] */
 PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first);
-PetscErrorCode CarryAngles(Runtime &from, Vec U, Vec V, Runtime &to, Vec X, Vec Y); /* to a run that goes on in another vector */
-/* reframe.cpp: others' bodies too */
+PetscErrorCode CarryAngles(Runtime &from, Vec U, Vec V, Runtime &to, Vec X, Vec Y); /* to a run that continues `from`, with the state X, Y */
+/* reframe.cpp: moves all bodies of this rank, also those owned by others, to the state (U, V) */
 PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V);
-/* dropped_rows.cpp: an error where one is violated */
+/* dropped_rows.cpp: an error if a dropped row is violated */
 PetscErrorCode LocalizeDropped(Runtime &R, Localizer &l);
 PetscErrorCode CheckDropped(Runtime &R, PetscReal t, Vec U, Vec V);
-/* kept.cpp: the end of the vector of checkpoints, of Kept() entries: parameters, and behind them these */
-constexpr PetscInt kept = 72;
+/* kept.cpp: the last Kept() entries of Runtime::axes: parameters, then checkpoint_numbers entries */
+constexpr PetscInt checkpoint_numbers = 72;
 PetscInt           Kept(const Runtime &R);
 PetscErrorCode     WriteKept(Runtime &R);                 /* before a checkpoint is written */
 PetscErrorCode     ReadKept(Runtime &R, const double *x); /* after one was read */
-/* step_limit.cpp: no step goes through a contact, or loses a turn of an angle */
+/* step_limit.cpp: upper bounds on the step size, so that no contact is tunnelled through and no full turn of an angle is lost */
 PetscErrorCode AttachStepLimit(Runtime &R, TS ts);
 /* expressions.cpp: variables, states, user's forces */
 PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l);
@@ -139,30 +139,30 @@ PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l);
 PetscErrorCode LocalizeChannels(Runtime &R, Localizer &l);
 PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts);
 PetscErrorCode FinishOutput(Runtime &R);
-/* output/recorder.cpp: Scene::output() was set when the TS was made, and Scene::solve() has not been called yet; a notice if the TS is solved all the same */
+/* output/recorder.cpp: a notice if a TS with output settings is solved by TSSolve() and not by Scene::solve(), which attaches the output */
 PetscErrorCode ExpectOutput(TS ts, const OutputSettings &settings);
 PetscErrorCode OutputIsAttached(TS ts);
 PetscErrorCode TellOfNoOutput(const Runtime &R, TS ts);
-constexpr PetscInt recorded = 68; /* numbers by which a recording goes on */
+constexpr PetscInt recorder_numbers = 68; /* of the state of the recorder in a checkpoint */
 PetscErrorCode     SaveOutput(Runtime &R, double *x);
 PetscErrorCode     ResumeOutput(Runtime &R, const double *x);
-/* ts.cpp: a run from the start, which the TS owns; the run of this scene that the TS owns, for the call that is named */
+/* ts.cpp. CreateRun(): a run from the start, which the TS owns. FindRun(): the run of this scene that the TS owns; call: for the error message */
 PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts);
 PetscErrorCode FindRun(const Scene &scene, TS ts, const char *call, Runtime **R);
-/* continue.cpp: the run of a TS that has made no step yet, for the call that is named; a run of the same model that has made its first step from where ts is, before its own first one: it has accelerations and
-   multipliers of the start; the caller destroys it */
+/* continue.cpp. NotBegun(): the run of a TS that has made no step yet; call: for the error message. BeginCopy(): a run of the same model that has made its first step from the state of ts, so
+   that it has the accelerations and multipliers of the start; the caller destroys it */
 PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R);
 PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy);
-PetscErrorCode ReadCheckpoint(TS ts);      /* a file that TSHHT3CheckpointLoad() has noted for the set-up */
-PetscErrorCode StartWithMotions(TS ts);    /* a run from rest, where a motion moves something: its start finds the velocities, unless the user says how it is to start */
-PetscErrorCode ToNearestConsistent(TS ts); /* the state of a run that has not begun, in the metric of its mass matrix, with the axes of its angles */
-PetscErrorCode KeepStart(TS ts, Vec A); /* accelerations of the present state, which has its multipliers */
-/* state: u, u', u'' of a run that has not begun, with the accelerations and multipliers of its start or equilibrium; copy: the run that has
-   found them, null if none was needed */
+PetscErrorCode ReadCheckpoint(TS ts);      /* reads the file of TSHHT3CheckpointLoad(), which is otherwise read at the set-up of the TS */
+PetscErrorCode StartWithMotions(TS ts);    /* a run from rest with moving motions: its start projects the velocities, unless -ts_hhtdae_start is given */
+PetscErrorCode ToNearestConsistent(TS ts); /* moves the state of a run that has not begun to the nearest consistent one in the metric of the mass matrix */
+PetscErrorCode KeepStart(TS ts, Vec A);    /* stores the solution, with its multipliers, and the accelerations A in Runtime::start_state */
+/* state: u, u', u'' of a run that has not begun, with the accelerations and multipliers of its start or equilibrium; copy: the run that was
+   made to find them, null if none was needed */
 PetscErrorCode StateOfStart(TS ts, PetscReal t, Vec state[3], TS *copy);
-std::vector<double> ParametersNow(const SceneData &s); /* functions of the state read present values */
-/* u, u', u'' of a run at t: of the start; within the last step, from the equations or, where nobody needs these, interpolated; at the present time, where parameters
-   or the solution have been changed since the last step or a restart is due, those that a start from there has. TS types other than hhtdae: the end of the last
+std::vector<double> ParametersNow(const SceneData &s); /* present values of all parameters */
+/* u, u', u'' of a run at t: before the first step of the start; else within the last step, from the equations or, without from_equations, interpolated. If parameters or the solution have been
+   changed since the last step, or a restart is due, the state at the present time is that of a start from there. TS types other than hhtdae: the end of the last
    step, without accelerations. copy: as above */
 PetscErrorCode StateAt(TS ts, PetscReal t, bool from_equations, Vec state[3], TS *copy);
 

@@ -267,7 +267,7 @@ PetscErrorCode Scene::setUp()
     else PetscCall(Partition(s, M.size, M.number.owner));
     FillLight(s);
     M.described.clear();
-    M.turned.clear();
+    M.start_memories.clear();
     for (const BodyData &b : s.bodies) M.described.push_back(b.A);
     PetscCall(Assemble(M));
     PetscCall(DropRedundant(M));

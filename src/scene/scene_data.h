@@ -19,9 +19,9 @@ struct FlexibleData {
   std::shared_ptr<const ModalBody> model;
   ModalMass                        mass;
   std::vector<double>              damping, deformation, deformation_rate; /* ratios, modal coordinates at the start */
-  PetscInt                         frame = -1; /* marker of the floating frame, on which loads of the modes and contacts of nodes act */
+  PetscInt                         frame = -1;                             /* marker of the floating frame, for modal loads and contacts of nodes */
 
-  /* Places that markers take hold of: attachments, and behind them the kept nodes */
+  /* Points to which markers can be attached: attachments, then kept nodes */
   const ModalAttachment &place(PetscInt k) const
   {
     const std::size_t n = model->attachments.size(), i = (std::size_t)k;
@@ -40,10 +40,10 @@ struct BodyData {
   Matrix3     A;        /* body axes at the start */
   Vector3     v, w;     /* at the start, space axes */
   std::shared_ptr<const FlexibleData> flexible; /* of a flexible body; then the rest belongs to its floating frame, undeformed */
-  PetscInt    carrier = -1, attachment = -1;    /* of the frame of an attachment or node: its flexible body and FlexibleData::place(); it has no coordinates in a run */
-  bool        forces_alone = false;             /* the frame of a node whose neighbours tell no rotation */
-  bool        massless = false; /* the frame of an attachment, also one of a body of another library */
-  double      light_mass = 0, light_inertia = 0; /* what assembly takes, or adds, where there is no inertia: a little of that of others */
+  PetscInt                            carrier = -1, attachment = -1;     /* if this is the frame of an attachment or node: its flexible body and number in FlexibleData::place(); it has no coordinates in a run */
+  bool                                forces_alone = false;              /* the frame of a node whose rotation its neighbours do not determine: it takes forces, no moments */
+  bool                                massless     = false;              /* the frame of an attachment, of a flexible body or of an extension */
+  double                              light_mass = 0, light_inertia = 0; /* least mass and moments of inertia in the metric of assembly, FillLight() */
 };
 
 struct MarkerData {
@@ -52,7 +52,7 @@ struct MarkerData {
   Matrix3  R;    /* axes, in body axes */
 };
 
-/* A scalar unknown of the scene, by what it is for the user */
+/* A scalar unknown of the scene, by its meaning for the user */
 struct ScalarRef {
   enum Kind { Multiplier, ForceState, Variable, State, Modal } kind = Variable;
   PetscInt id        = -1; /* element, variable, state or flexible body */
@@ -62,7 +62,7 @@ struct ScalarRef {
 class StoreBase; /* all instances of one kernel, store.h */
 class Extension; /* unknowns of other kinds, extension.h */
 
-/* A number in messages */
+/* A number as text, for messages */
 inline std::string Show(double x)
 {
   char text[32];
@@ -89,7 +89,7 @@ struct ExpressionData { /* variable or state */
   std::string name;
   Expression  expression;
   double      initial;
-  bool        reached = false; /* initial is what a run has made of it */
+  bool        reached = false; /* `initial` is from a run */
 };
 
 struct ChannelData {
@@ -107,23 +107,23 @@ struct SurfaceData {
   std::shared_ptr<const Surface> surface; /* read on the first rank alone */
 };
 
-/* What the start-up work has found */
+/* Results of assembly, redundancy check and equilibrium */
 struct StartResult {
   struct Row {
     PetscInt element;
     int      row; /* among the element's rows */
   };
-  PetscInt         coordinates = 0, rows = 0, core = 0; /* core: rows left after the trees were cut off */
+  PetscInt         coordinates = 0, rows = 0, core = 0; /* rows: of constraints; core: rows left after tree structures were removed */
   PetscInt         redundant = 0;                       /* rows, dropped or not */
   std::vector<Row> dropped;
-  double           misfit = 0, velocity_misfit = 0;     /* largest of an element: relative to the scene's size, and to its speed */
-  double           speed = 0;                           /* what velocity misfits are held against */
-  double           moved = 0, turned = 0;               /* most, by assembly and equilibrium */
+  double           misfit = 0, velocity_misfit = 0; /* largest violation of an element's constraints, relative to the mechanism's size and to `speed` */
+  double           speed = 0;                       /* largest speed of the scene */
+  double           moved = 0, turned = 0;           /* largest displacement and rotation (rad) of a body by assembly or equilibrium */
   PetscInt         assembly_iterations = 0, equilibrium_iterations = 0;
   PetscInt         degreesOfFreedom() const { return coordinates - (rows - redundant); }
 };
 
-/* In checkpoints: elements were described with one value, functions read the present one */
+/* `described`: value with which elements were described; functions read the present one. Checkpoints have both */
 struct ParameterData {
   std::string                   name;
   std::shared_ptr<const double> present;
@@ -131,7 +131,7 @@ struct ParameterData {
 };
 
 struct SceneData {
-  PetscInt                    number = 0; /* of the scene, which its handles bear */
+  PetscInt                                              number = 0; /* of the scene, stored in its handles */
   MPI_Comm                    comm;
   bool                        planar = false;
   std::vector<BodyData>       bodies;
@@ -140,7 +140,7 @@ struct SceneData {
   std::vector<ElementData>    elements;
   std::vector<ExpressionData> variables, states;
   std::map<std::type_index, std::unique_ptr<StoreBase>> stores;
-  std::vector<StoreBase *>    order; /* of first use: the order of assembly */
+  std::vector<StoreBase *>                              order; /* stores in the order of first use, which is the order of evaluation */
   std::vector<std::unique_ptr<Extension>> extensions;
   Vector3                     gravity = Vector3::Zero();
   std::vector<TimeFunction>   ground_acceleration; /* along the space axes; empty: none */
@@ -150,19 +150,19 @@ struct SceneData {
   std::vector<std::vector<PetscInt>> lines; /* of markers, in the animation */
   std::vector<ParameterData>  parameters;
   std::vector<std::string>    errors; /* found while the scene was described */
-  StartPolicy                 start; /* of setUp(), with options */
-  StartPolicy                 start_given;
+  StartPolicy                                           start;  /* with options */
+  StartPolicy                                           start_given; /* without */
   StartResult                 started;
-  bool                        fixed = false; /* from setUp() on */
-  std::size_t                 markers_then = 0; /* when it was fixed: later markers are of queries alone */
+  bool                                                  fixed        = false; /* from setUp() on nothing may be added but markers for queries */
+  std::size_t                                           markers_then = 0;     /* number of markers at that time */
 
   SceneData();
   ~SceneData();
-  /* Where an element loads a body: there; where that is an attachment on which it does not act, its flexible body, on whose modes it may act; -2: neither.
-     elsewhere: another attachment of that body on which it acts then, or -1 */
+  /* The body on which an element acts: `body`, or, if `body` is an attachment on which it does not act, its flexible body (on whose modes it may act); -2: neither.
+     elsewhere: in the latter case another attachment of that flexible body on which the element acts, or -1 */
   PetscInt    loadedBody(const ElementData &e, PetscInt body, PetscInt *elsewhere = nullptr) const;
   std::string bodyName(PetscInt b) const { return b < 0 ? "ground" : bodies[b].name; }
-  /* Whether a body takes no moment, and what it is then called in messages */
+  /* Whether a body takes no moments; its name in messages then */
   bool        turnless(PetscInt b) const { return b >= 0 && (bodies[b].point || bodies[b].forces_alone); }
   std::string turnlessName(PetscInt b) const
   {
@@ -178,14 +178,14 @@ struct SceneData {
   {
     if (fixed) errors.push_back(what + " came too late: the scene is fixed from its set-up or first run on");
   }
-  Vector3 gravityAt(double t) const; /* less the ground's acceleration */
+  Vector3 gravityAt(double t) const; /* minus the ground's acceleration */
   /* at the start */
   Frame<double> frame(Marker m) const;
   Twist<double> twist(Marker m) const;
 };
 
 /*
-  What a joint's or force's file uses to enter itself:
+  Enters a joint or force into the scene:
 
     template <> Element Scene::enter(const std::string &name, const Revolute &s)
     {
@@ -200,7 +200,7 @@ struct SceneData {
 class ElementBuilder
 {
 public:
-  /* pair: false if marker j is none */
+  /* pair: whether the element has a marker j */
   ElementBuilder(Scene &scene, const std::string &name, const char *type, ElementData::Kind kind, Marker i, Marker j, bool pair = true);
 
   bool planar() const { return data_.planar; }
@@ -210,12 +210,12 @@ public:
   void require(Marker m, const char *what);                 /* m is a marker of this scene */
   Frame<double>    frame(Marker m) const { return data_.frame(m); } /* at the start; only if good() */
   const SceneData &scene() const { return data_; }
-  bool             coincident(Marker i, Marker j) const; /* at the start, but for rounding of where bodies and markers are */
+  bool             coincident(Marker i, Marker j) const; /* at the start, up to rounding of the positions */
 
   /* a constraint kernel on these markers; returns the first of its rows among the element's rows */
   template <class K> PetscInt constrain(std::initializer_list<Marker> markers, const typename K::Data &data = {});
   template <class K> PetscInt constrain(const std::vector<Marker> &markers, const typename K::Data &data, const std::vector<ScalarRef> &inputs);
-  /* a force kernel; inputs: the scalars z of components(); state: carry the components as force states */
+  /* a force kernel; inputs: the scalars z of components(); state: the components become force states */
   template <class K>
   void load(std::initializer_list<Marker> markers, const typename K::Data &data = {}, const std::vector<ScalarRef> &inputs = {},
             bool state = false);

@@ -1,4 +1,4 @@
-/* The state of a run that a snapshot has taken, of which its questions are asked (query.cpp, query_measures.cpp). */
+/* The state of a run that a snapshot has taken, from which it answers queries (query.cpp, query_measures.cpp). */
 #ifndef HHTDAE_SCENE_SNAPSHOT_H
 #define HHTDAE_SCENE_SNAPSHOT_H
 
@@ -10,26 +10,26 @@
 namespace hhtdae
 {
 
-/* What the unknowns of a state count from: attitudes that rotations refer to, what elements remember of accepted steps, and angles over full turns.
-   The run has others once it has gone on. */
+/* The data that belong to the unknowns of a state: reference attitudes of rotations, memories of elements, and angles over full turns. The run itself replaces them
+   with every accepted step. */
 struct Origin {
-  std::vector<Matrix3>      references; /* of this rank's bodies, then those of others */
-  std::vector<double>       memories;   /* of all batches; empty where no element remembers */
+  std::vector<Matrix3>      references; /* of this rank's bodies, then of others' */
+  std::vector<double>       memories;   /* of all batches; empty if no element has memory */
   std::vector<CountedAngle> counted;
-  long                      accepts = 0; /* accepted states before it */
+  long                      accepted_states = 0; /* Runtime::accepted_states at that time */
 
   void take(Runtime &R)
   {
-    counted = R.asked;
-    accepts = R.accepts;
+    counted         = R.queried_angles;
+    accepted_states = R.accepted_states;
     references.clear();
     for (const LocalBody &b : R.bodies.body) references.push_back(b.C);
-    memories.resize(R.remembers ? Memories(R) : 0);
-    if (R.remembers) CopyMemories(R, memories.data(), false);
+    memories.resize(R.has_memory ? Memories(R) : 0);
+    if (R.has_memory) CopyMemories(R, memories.data(), false);
   }
 };
 
-/* The run counts from there while this lives, and as before after that */
+/* The run has the references and memories of an Origin during the lifetime of this object */
 class CountFrom
 {
 public:
@@ -57,16 +57,16 @@ private:
   }
 };
 
-/* The run, and the unknowns of this rank and of its neighbours at the time asked for */
+/* The run, and the local unknowns at the time of the snapshot */
 struct Snapshot::Work {
   Runtime            *R = nullptr;
   double              t = 0;
   std::vector<double> u, v, a;
-  long                moved = -1; /* which move of the bodies was to this state */
+  long                moved = -1; /* value of Bodies::moves when the bodies were moved to this state */
   Origin              origin;
 
   Evaluation at() const { return Evaluation{t, u.data(), v.data(), a.data(), R->bodies, R->n}; }
-  /* The bodies, where somebody else may have moved them */
+  /* Moves the bodies to this state unless they are there */
   void move()
   {
     if (moved == R->bodies.moves) return;
@@ -77,7 +77,7 @@ struct Snapshot::Work {
   const SceneData &scene() const { return R->scene; }
   PetscMPIInt      owner(PetscInt body) const { return R->number.owner.empty() ? 0 : R->number.owner[body]; }
 
-  /* What was described after the run was made has no place in it */
+  /* Errors if a body or element was described after the run was made */
   PetscErrorCode hasBody(PetscInt body) const;
   PetscErrorCode hasElement(PetscInt element) const;
   PetscErrorCode load(PetscInt element, PetscInt on, Load *x);
@@ -88,7 +88,7 @@ struct Snapshot::Work {
   PetscErrorCode angle(PetscInt i, PetscInt j, double *x);
 };
 
-/* Numbers that one rank computes, on all of them; what goes wrong there goes wrong everywhere */
+/* Numbers that the owner computes and sends to all ranks; an error there is an error on all ranks */
 template <class F> PetscErrorCode FromOwner(const Runtime &R, PetscMPIInt owner, double *x, int n, const F &compute)
 {
   std::vector<double> all(n + 1, 0);

@@ -1,4 +1,4 @@
-/* What happens between the description of a scene and its first step. */
+/* Preparation of a scene between its description and the first step: options, assembly, redundancy, inertia, equilibrium. */
 #ifndef HHTDAE_SCENE_START_H
 #define HHTDAE_SCENE_START_H
 
@@ -8,50 +8,51 @@
 namespace hhtdae
 {
 
-PetscErrorCode ChoosePackage(Mat J, PC pc); /* still.cpp: of a matrix that is factored outside of the integrator */
+PetscErrorCode ChoosePackage(Mat J, PC pc); /* still.cpp: solver package for matrices that are factored outside of the integrator */
 /* options.cpp */
 PetscErrorCode DeclareSceneOptions(); /* option_names.cpp */
 PetscErrorCode ReadStartOptions(SceneData &s);
 PetscErrorCode ViewStart(const SceneData &s, PetscViewer viewer);
 struct Runtime;
-/* kept.cpp: an error that names the ranks whose description, up to here, is another one than that of rank 0. Collective, before anything else that is */
+/* kept.cpp: an error that names the ranks whose description differs from that of rank 0. Collective; to be called before any other collective work on the description */
 PetscErrorCode CompareDescriptions(const SceneData &s, PetscMPIInt size);
-PetscErrorCode CheckSame(const Runtime &R, TS ts); /* the same of a run's time, end and tolerances */
+PetscErrorCode CheckSame(const Runtime &R, TS ts);                              /* an error if time, final time or tolerances of a run differ between ranks */
 PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer); /* view.cpp; R: a run of it, or null */
 
-/* ---- rows.cpp: all constraints where the description puts the bodies ---- */
+/* ---- rows.cpp: all constraints at the described poses ---- */
 
-/* The rows of one kernel instance; columns are velocity of the centre of mass and angular velocity in space axes, as
-   far as the kind of body has them, of the bodies that can move */
+/* The rows of one kernel instance. Columns: velocity of the centre of mass and angular velocity in space axes, of the movable bodies and as far as their kind has them */
 struct RowBlock {
   StoreBase            *store;
   PetscInt              instance, element;
-  int                   first; /* of its rows among the element's */
+  int                   first; /* its first row among the element's */
   int                   rows;
   unsigned char         active;
   const char           *name;
   bool                  length, holonomic;
   std::vector<PetscInt> body;
-  std::vector<int>      column; /* of J, where each body's begin; and their number */
+  std::vector<int>      column; /* first column of each body in J, and the number of columns */
   Eigen::MatrixXd       J;
   Eigen::VectorXd       value, rate, speed; /* Phi, Phi_t (Psi at rest), Phi_q q' + Phi_t (Psi) */
 
   bool has(int r) const { return active >> r & 1; }
 };
-enum class Hold { None, Nodes, FixedStart }; /* what counts as ground: nothing, frames that nodes of another library hold, these and bodies with fixed_start */
-enum class Modes { Held, Free };      /* modal coordinates: not among the columns, or behind those of their body */
+/* Bodies that cannot move: none; frames at nodes of extensions; these and bodies with fixed_start */
+enum class FixedBodies { None, Nodes, FixedStart };
+/* Whether a body's columns end with its modal coordinates */
+enum class ModalColumns { None, Included };
 
-std::vector<RowBlock> DescribeAll(const SceneData &s, double t, Hold hold, Modes modes = Modes::Held);
+std::vector<RowBlock> DescribeAll(const SceneData &s, double t, FixedBodies fixed_bodies, ModalColumns modes = ModalColumns::None);
 double                SceneSize(const SceneData &s); /* diagonal of the box around bodies and markers */
-double                MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks); /* of the largest group of bodies that these rows hang together, and of their markers */
+double                MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks); /* of the largest group of bodies that these rows connect, with the markers */
 std::string           RowName(const SceneData &s, PetscInt element, int row, const char *kernel);
 
 /* Directions of motion of a body: indices among (v, w) */
 const std::vector<int> &Directions(BodyKind k);
-int                     Width(const SceneData &s, PetscInt body); /* their number, and that of modal coordinates */
+int                     Width(const SceneData &s, PetscInt body); /* number of a body's directions of motion and modal coordinates */
 
-/* ---- nearest.cpp: Phi_q M^-1 Phi_q^T, distributed by the owners of the elements; the same blocks, but for their
- * values, in all calls ---- */
+/* ---- nearest.cpp: Phi_q M^-1 Phi_q^T, rows distributed by the owners of the elements; the structure of the blocks must be
+ * the same in all calls ---- */
 class NearestSystem
 {
 public:
@@ -59,11 +60,11 @@ public:
   ~NearestSystem();
   NearestSystem(const NearestSystem &) = delete;
   PetscErrorCode factor(const std::vector<RowBlock> &blocks);
-  /* d: 6 numbers a body, the smallest change in the metric of the masses with Phi_q d = rhs (rows of the blocks in
-     their order); where `from` is given, nearest to it */
+  /* d: 6 numbers per body, the smallest change in the metric of the masses with Phi_q d = rhs (rows in the order of the blocks),
+     or, unless `from` is null, the one nearest to `from` */
   PetscErrorCode             solve(const std::vector<RowBlock> &blocks, const std::vector<double> &rhs,
                                    const std::vector<double> *from, std::vector<double> &d);
-  const std::vector<double> &weights() const { return weight_; } /* Phi_q M^-1 Phi_q^T, diagonal */
+  const std::vector<double> &weights() const { return weight_; } /* diagonal of Phi_q M^-1 Phi_q^T */
 
 private:
   Model                &M;
@@ -88,18 +89,18 @@ struct Pose {
 std::vector<Pose> Poses(const SceneData &s);
 void              SetPoses(SceneData &s, const std::vector<Pose> &p);
 PetscErrorCode    ReportMoves(SceneData &s, const std::vector<Pose> &before, const char *what);
-/* rigid motions of bodies to the constraints of all elements, or of those marked in `part`; ok: within the tolerance */
-PetscErrorCode ProjectPositions(Model &M, Hold hold, bool *ok, const std::vector<char> *part = nullptr);
-PetscErrorCode Assemble(Model &M); /* reports or projects, as the policy says */
-std::vector<char> RigidElements(const SceneData &s, Hold hold); /* those that no flexible body deforms for */
-bool           LeftToDeform(const SceneData &s); /* Assemble() has left misfits that flexible bodies have to deform for: the run's first state is to be projected */
+/* moves bodies rigidly to satisfy the constraints of all elements, or of those marked in `elements`; ok: within the tolerance */
+PetscErrorCode    ProjectPositions(Model &M, FixedBodies fixed_bodies, bool *ok, const std::vector<char> *elements = nullptr);
+PetscErrorCode    Assemble(Model &M);                                          /* reports or projects, by StartPolicy::assembly */
+std::vector<char> RigidElements(const SceneData &s, FixedBodies fixed_bodies); /* marks elements that only rigid motions can satisfy */
+bool              LeftToDeform(const SceneData &s);                            /* Assemble() has left violations that need deformations of flexible bodies: the run's first state is to be projected */
 
 /* ---- redundancy.cpp ---- */
 PetscErrorCode DropRedundant(Model &M);
 
-/* ---- inertia.cpp: what has no inertia ---- */
-void           FillLight(SceneData &s);
-PetscErrorCode CheckInertia(const SceneData &s); /* it follows from the constraints */
+/* ---- inertia.cpp: bodies without mass or moments of inertia ---- */
+void           FillLight(SceneData &s);          /* BodyData::light_mass, light_inertia */
+PetscErrorCode CheckInertia(const SceneData &s); /* movements without inertia must be determined by the constraints */
 
 /* ---- equilibrium.cpp: after Number(), with a layout of its own ---- */
 PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M);

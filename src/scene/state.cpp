@@ -1,4 +1,4 @@
-/* A state out of the unknowns of a run into the description of a scene, on every rank: equilibrium, and runs that others go on from. */
+/* Writes the state of a run into the description of a scene, on every rank: after equilibrium, and for runs that continue others. */
 #include "extension.h"
 #include "runtime.h"
 #include "start.h"
@@ -10,7 +10,7 @@ namespace hhtdae
 namespace
 {
 
-/* The deformation of flexible bodies and its rate, from their owners to every rank */
+/* Deformations of flexible bodies and their rates, sent by their owners */
 PetscErrorCode WriteModes(Model &M, const Runtime &R, const PetscScalar *u, const PetscScalar *v)
 {
   SceneData &s = M.scene;
@@ -35,7 +35,7 @@ PetscErrorCode WriteModes(Model &M, const Runtime &R, const PetscScalar *u, cons
 PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V)
 {
   SceneData               &s     = M.scene;
-  const int                width = 19; /* body, position, attitude, velocities */
+  const int                width = 19; /* numbers per body: index, position, attitude, velocities */
   const PetscScalar       *u, *v;
   const double            *local[3];
   std::vector<double>      mine, all, rest(V ? 0 : R.n, 0.0);
@@ -51,8 +51,8 @@ PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V)
     mine.push_back((double)R.bodies.body[b].id);
     mine.insert(mine.end(), m.r.data(), m.r.data() + 3);
     const BodyKind kind  = R.bodies.body[b].kind;
-    const bool     turns = TurnsInSpace(kind) || kind == BodyKind::Planar || kind == BodyKind::Attached;
-    const Matrix3  A     = turns ? m.A : s.bodies[R.bodies.body[b].id].A;
+    const bool     rotates = TurnsInSpace(kind) || kind == BodyKind::Planar || kind == BodyKind::Attached;
+    const Matrix3  A       = rotates ? m.A : s.bodies[R.bodies.body[b].id].A;
     mine.insert(mine.end(), A.data(), A.data() + 9);
     mine.insert(mine.end(), m.v.data(), m.v.data() + 3);
     mine.insert(mine.end(), m.w.data(), m.w.data() + 3);
@@ -78,7 +78,7 @@ PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V)
     BodyData &b = s.bodies[(std::size_t)all[k]];
     b.A         = Eigen::Map<const Matrix3>(&all[k + 4]);
     b.w         = Eigen::Map<const Vector3>(&all[k + 16]);
-    /* The description may have moved the centre of mass in the body: its origin stays where it is (Continue.AnotherCentreOfMass). */
+    /* If the new description has another centre of mass, the position of the body's origin is kept (Continue.AnotherCentreOfMass) */
     const Vector3 moved = b.A * (b.center - R.scene.bodies[(std::size_t)all[k]].center);
     b.r                 = Eigen::Map<const Vector3>(&all[k + 1]) + moved;
     b.v                 = Eigen::Map<const Vector3>(&all[k + 13]) + b.w.cross(moved);

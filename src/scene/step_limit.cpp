@@ -1,7 +1,6 @@
 /*
-  What a step must not skip. Bodies that fly towards each other: none may be through the other at its end. Angles over full turns: it
-  must not turn them so far that the turns cannot be told. Local rotation vectors: no body may turn so far that their series ends too
-  soon. In free flight the error estimate finds nothing to object to, whatever the length of the step.
+  Upper bounds on the next step that the error estimate does not give, since it vanishes in free flight whatever the step: no contact is tunnelled through, no counted angle turns
+  by more than half a turn (Batch::longestStep()), and rotation vectors stay small enough for their truncated series.
 */
 #include "runtime.h"
 #include <limits>
@@ -12,10 +11,11 @@ namespace hhtdae
 namespace
 {
 
-constexpr double farthest = 1; /* of a body's rotation in a step, rad: the series of a rotation vector (rotation.h) is cut, and the error estimate knows its next term */
+/* rad, of a body in a step: the integrator truncates Magnus' series of the rotation vector (src/integrator/coordinates/rotations.cpp), and the error estimate contains only its next term */
+constexpr double max_rotation_per_step = 1;
 
-/* By elements */
-PetscErrorCode LimitOfBatches(Runtime &R, PetscReal t, Vec U, Vec V, Vec A, double *least)
+/* Reduces *max_step to what the elements of this rank allow */
+PetscErrorCode LimitOfElements(Runtime &R, PetscReal t, Vec U, Vec V, Vec A, double *max_step)
 {
   const double       *u, *v, *a, *local[3];
   std::vector<double> acceleration;
@@ -24,40 +24,40 @@ PetscErrorCode LimitOfBatches(Runtime &R, PetscReal t, Vec U, Vec V, Vec A, doub
   PetscCall(VecGetArrayRead(V, &v));
   PetscCall(VecGetArrayRead(A, &a));
   PetscCall(LocalMotion(R, u, v, a, acceleration, local));
-  if (R.moved != R.bodies.moves) R.bodies.move(local[0], local[1]); /* else they have just been asked what to remember of this state */
+  if (R.accepted_move != R.bodies.moves) R.bodies.move(local[0], local[1]); /* else the bodies are at this state already */
   const Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n};
-  for (const auto &b : R.batches) *least = std::min(*least, b->longestStep(e));
+  for (const auto &b : R.batches) *max_step = std::min(*max_step, b->longestStep(e));
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(VecRestoreArrayRead(V, &v));
   PetscCall(VecRestoreArrayRead(A, &a));
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LimitOfTurns(const Runtime &R, Vec V, double *least)
+PetscErrorCode LimitOfRotations(const Runtime &R, Vec V, double *max_step)
 {
   const double *v;
   double        fastest = 0;
   PetscFunctionBegin;
-  if (!R.turns || !R.bodies.local) PetscFunctionReturn(0);
+  if (!R.rotates_in_space || !R.bodies.local) PetscFunctionReturn(0);
   PetscCall(VecGetArrayRead(V, &v));
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k = R.bodies.body[b];
     if (TurnsInSpace(k.kind)) fastest = std::max(fastest, Eigen::Map<const Vector3>(v + k.first + 3).norm());
   }
   PetscCall(VecRestoreArrayRead(V, &v));
-  if (fastest > farthest / *least) *least = farthest / fastest; /* *least may be the largest number */
+  if (fastest > max_rotation_per_step / *max_step) *max_step = max_rotation_per_step / fastest; /* a product with *max_step may overflow */
   PetscFunctionReturn(0);
 }
 
 PetscErrorCode Limit(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx)
 {
   Runtime &R     = *static_cast<Runtime *>(ctx);
-  double   least = *h;
+  double   max_step = *h;
   PetscFunctionBegin;
-  if (R.steps_limited) PetscCall(LimitOfBatches(R, t, U, V, A, &least));
-  PetscCall(LimitOfTurns(R, V, &least));
-  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPI_DOUBLE, MPI_MIN, R.scene.comm));
-  *h = least;
+  if (R.steps_limited) PetscCall(LimitOfElements(R, t, U, V, A, &max_step));
+  PetscCall(LimitOfRotations(R, V, &max_step));
+  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &max_step, 1, MPI_DOUBLE, MPI_MIN, R.scene.comm));
+  *h = max_step;
   PetscFunctionReturn(0);
 }
 
@@ -70,7 +70,7 @@ PetscErrorCode AttachStepLimit(Runtime &R, TS ts)
   for (const auto &b : R.batches) any |= b->limitsSteps();
   if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, R.scene.comm));
   R.steps_limited = any;
-  if (any || (R.turns && R.bodies.local)) PetscCall(TSHHT3SetStepLimit(ts, Limit, &R));
+  if (any || (R.rotates_in_space && R.bodies.local)) PetscCall(TSHHT3SetStepLimit(ts, Limit, &R));
   PetscFunctionReturn(0);
 }
 

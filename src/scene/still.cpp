@@ -15,8 +15,8 @@ StillSystem::~StillSystem()
   for (Vec *x : {&U, &V, &A, &zero, &F, &d, &next}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
 }
 
-/* As the integrator would: KLU where it is there, which it is on one rank alone; else MUMPS through the package that gives
-   it more room where pivots change with the length of a step (AnalysesRanks.HangingChain) */
+/* Same order as in the integrator: KLU on one rank; else MUMPS through "mumpsnd", which enlarges its workspace when pivots change with the
+   length of a step (AnalysesRanks.HangingChain) */
 PetscErrorCode ChoosePackage(Mat J, PC pc)
 {
   PetscFunctionBegin;
@@ -50,7 +50,7 @@ PetscErrorCode StillSystem::create(Vec begin, const char *prefix)
   PetscFunctionReturn(0);
 }
 
-/* For the largest of all, which is not defined where one is no number */
+/* |x|, or infinity for NaN, so that a maximum is defined */
 static double Size(double x) { return std::isnan(x) ? INFINITY : std::abs(x); }
 
 PetscErrorCode StillSystem::measure(Vec x, Unbalanced &out) const
@@ -66,7 +66,7 @@ PetscErrorCode StillSystem::measure(Vec x, Unbalanced &out) const
   for (PetscInt b = 0; b < R.bodies.own; b++) {
     const LocalBody &k          = R.bodies.body[b];
     const int        directions = PlanarScene(k.kind) ? 2 : 3, whole = Coordinates(k.kind);
-    const double     modal      = std::sqrt(R.scene.bodies[k.id].mass); /* of modal forces, as if the modes moved all mass (SmallBodies.Equilibrium) */
+    const double     modal = std::sqrt(R.scene.bodies[k.id].mass); /* modes have unit modal mass: a modal force times sqrt(m) is the force on the whole mass (SmallBodies.Equilibrium) */
     for (int c = 0; c < R.bodies.coordinates(b); c++) {
       const double y = Size(f[k.first + c]) * (c < directions ? 1 : c < whole ? 1 / size : modal);
       if (y > mine.value) mine = {y, (int)k.id};

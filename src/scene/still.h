@@ -1,5 +1,5 @@
 /*
-  The unknowns of a run at one time, with what Newton's method on them needs outside of the integrator: equilibrium.cpp, analyses.cpp.
+  Vectors, matrix and linear solver of Newton's method on the unknowns of a run at a fixed time, outside of the integrator: equilibrium.cpp, analyses.cpp.
 */
 #ifndef HHTDAE_SCENE_STILL_H
 #define HHTDAE_SCENE_STILL_H
@@ -12,14 +12,14 @@
 namespace hhtdae
 {
 
-/* The largest force that nothing balances, and on which body; moments as forces at the scene's size */
+/* Maximum norms of a residual. force: of the equations of motion, moments divided by the scene's size; body: where it is, -1: not on a body of the scene */
 struct Unbalanced {
-  double   force = 0, misfit = 0, other = 0; /* misfit: of holonomic constraints */
-  double   step = INFINITY; /* the last one: radians, parts of the scene's size */
+  double   force = 0, misfit = 0, other = 0; /* misfit: of holonomic constraints; other: of constraints at velocity level, variables, force states and states */
+  double   step = INFINITY;                  /* length of the last step: radians, parts of the scene's size */
   PetscInt body = -1;
 };
 
-constexpr double largest_turn = 0.25; /* in one step: radians, parts of the scene's size */
+constexpr double largest_turn = 0.25; /* longest step of a body's coordinates: radians, or parts of the scene's size */
 
 struct StillSystem {
   Runtime &R;
@@ -27,19 +27,18 @@ struct StillSystem {
   Vec      U = nullptr, V = nullptr, A = nullptr, zero = nullptr, F = nullptr, d = nullptr, next = nullptr;
   Mat      J   = nullptr;
   KSP      ksp = nullptr;
-  std::vector<PetscInt> unread; /* own rows of states that nothing reads: they rest at any value, whatever their rates, and are not measured */
+  std::vector<PetscInt> unread; /* own rows of states that no equation reads: measure() leaves them out, since equilibrium does not depend on them */
 
   StillSystem(Runtime &r, double time);
   ~StillSystem();
   StillSystem(const StillSystem &) = delete;
-  PetscErrorCode create(Vec begin, const char *prefix); /* U is a copy of it */
-  PetscErrorCode residual(Vec u) { return Residual(R, t, u, zero, zero, F); } /* at rest, into F */
-  /* Only bodies' coordinates are compared with forces, only holonomic rows with lengths; what is left are definitions and states */
+  PetscErrorCode create(Vec begin, const char *prefix);                       /* U becomes a copy of begin; prefix: of the KSP's options */
+  PetscErrorCode residual(Vec u) { return Residual(R, t, u, zero, zero, F); } /* F of u at rest */
   PetscErrorCode measure(Vec f, Unbalanced &out) const;
-  PetscErrorCode reach(Vec x, double *part) const; /* the largest move of a body, as a part of what one step may do; NaN: infinite */
+  PetscErrorCode reach(Vec x, double *part) const; /* the largest displacement or rotation of a body in x, in units of largest_turn; infinite if an entry is NaN */
 };
 
-/* equilibrium.cpp: downhill from U to static equilibrium at t */
+/* equilibrium.cpp: moves U to static equilibrium at t */
 PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations);
 
 } // namespace hhtdae

@@ -1,4 +1,4 @@
-/* The instances of one kernel as the scene describes them, and what of them this rank needs. Included by scene_data.h. */
+/* The described instances of one kernel; localize() makes the batches of those that a rank needs. Included by scene_data.h. */
 #ifndef HHTDAE_SCENE_STORE_H
 #define HHTDAE_SCENE_STORE_H
 
@@ -13,12 +13,12 @@ namespace hhtdae
 
 struct Runtime;
 
-/* Gives an instance its place among this rank's unknowns; layout.cpp */
+/* Translates markers and unknowns of an instance to this rank's numbers; layout.cpp */
 class Localizer
 {
 public:
   virtual ~Localizer() = default;
-  virtual bool     needed(const StoreBase &s, PetscInt e) const = 0; /* it belongs to this rank or touches its bodies */
+  virtual bool     needed(const StoreBase &s, PetscInt e) const = 0; /* the instance belongs to this rank or acts on its bodies */
   virtual PetscInt marker(PetscInt id)                          = 0;
   virtual PetscInt group(PetscInt global, PetscInt size)        = 0;
   virtual PetscInt local(PetscInt global) const                 = 0;
@@ -37,49 +37,49 @@ public:
   virtual PetscInt      element(PetscInt e) const         = 0;
   virtual bool          isConstraint() const { return false; }
   virtual bool          isHolonomic() const { return false; } /* of constraints */
-  virtual bool          loads(int) const { return true; } /* whether the body of the k-th marker takes a load; else it is read alone */
-  virtual int           rows() const                      = 0; /* of a constraint, components of a force */
-  virtual unsigned char active(PetscInt) const { return 0; } /* bits of the rows of a constraint that stay */
+  virtual bool          loads(int) const { return true; }     /* whether the instance puts a load on the body of its k-th marker; else it only reads its motion */
+  virtual int           rows() const = 0;                     /* of a constraint; components of a force */
+  virtual unsigned char active(PetscInt) const { return 0; }  /* bits of the rows of a constraint that were not dropped */
   virtual void          setActive(PetscInt, unsigned char) {}
-  virtual bool          carried(PetscInt) const { return false; } /* as force states */
+  virtual bool          asForceStates(PetscInt) const { return false; } /* components are unknowns F */
   virtual bool          usesVelocities() const { return true; }
-  virtual bool          isExplicit() const { return false; } /* a constraint of the description alone, which a run meets without unknowns */
-  virtual bool          everIndependent() const { return false; } /* its rows of those of their kind: others are dropped instead */
-  virtual bool          curves() const { return true; }           /* reactions change with the markers' frames */
-  virtual bool          drivenAngle(PetscInt, double, double *) const { return false; } /* what a motion wants an angle to be at a time, with its turns */
-  virtual int           memory() const { return 0; } /* numbers that an instance remembers of accepted steps */
-  virtual void          remember(PetscInt, double *) {} /* these in place of what the description tells */
+  virtual bool          isExplicit() const { return false; }                            /* a constraint of the description that a run satisfies without multipliers: attach.h */
+  virtual bool          neverRedundant() const { return false; }                        /* among dependent rows never drop these, but another element's */
+  virtual bool          hasGeometricStiffness() const { return true; }                  /* d(Phi_q^T lambda)/dq is not zero */
+  virtual bool          drivenAngle(PetscInt, double, double *) const { return false; } /* the angle that a motion prescribes at a time, with full turns; false: none */
+  virtual int           memory() const { return 0; }                                    /* number of values that an instance stores of accepted steps */
+  virtual void          remember(PetscInt, double *) {}                                 /* initial memory of an instance, in place of that of the description */
   virtual int           inputs() const { return 0; }
   virtual ScalarRef     input(PetscInt, int) const { return {}; }
   virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
-  virtual void          describe(const SceneData &, PetscInt, double, DescribedRows &) const {} /* rows of a constraint, before any numbering */
-  /* one instance to be read where it is not assembled: loads of a constraint, components of a force that is not carried */
+  virtual void          describe(const SceneData &, PetscInt, double, DescribedRows &) const {} /* rows of a constraint at the described poses */
+  /* a copy of one instance for measures: loads of a constraint, components of a force that are not force states */
   virtual std::unique_ptr<Probe>         probe(Localizer &l, PetscInt e) const = 0;
   virtual const std::vector<Expression> *expressions(PetscInt) const { return nullptr; } /* of user's forces */
 
-  /* number of unknowns of its own: multipliers or force states */
+  /* number of multipliers or force states of an instance */
   int unknowns(PetscInt e) const
   {
     if (isExplicit()) return 0;
-    if (!isConstraint()) return carried(e) ? rows() : 0;
+    if (!isConstraint()) return asForceStates(e) ? rows() : 0;
     int n = 0;
     for (unsigned char m = active(e); m; m &= (unsigned char)(m - 1)) n++;
     return n;
   }
 
-  std::vector<PetscInt> start; /* global number of the first of them, layout.cpp */
+  std::vector<PetscInt> start; /* global number of the first unknown of each instance, numbering.cpp */
 };
 
 template <class K> struct Described {
   PetscInt         element;
   PetscInt         marker[K::markers];
   unsigned char    active = 0xff;
-  bool             carried = false;
+  bool             as_force_states = false;
   ScalarRef        input[K::inputs > 0 ? K::inputs : 1];
   typename K::Data data;
 };
 
-/* what both kinds of store share */
+/* common part of stores of constraints and forces */
 template <class K> class StoreOf : public StoreBase
 {
 public:
@@ -89,7 +89,7 @@ public:
   int       markers() const override { return K::markers; }
   PetscInt  marker(PetscInt e, int k) const override { return all[e].marker[k]; }
   PetscInt  element(PetscInt e) const override { return all[e].element; }
-  bool      carried(PetscInt e) const override { return all[e].carried; }
+  bool      asForceStates(PetscInt e) const override { return all[e].as_force_states; }
   int       memory() const override { return K::memory; }
   void      remember(PetscInt e, double *x) override { CopyMemory<K>(all[e], x, true); }
   int       inputs() const override { return K::inputs; }
@@ -111,15 +111,15 @@ public:
   bool          isHolonomic() const override { return K::holonomic; }
   bool          loads(int k) const override { return Depends(K::depends, 2 * k) || Depends(K::depends, 2 * k + 1); }
   bool          usesVelocities() const override { return !K::holonomic; }
-  bool          curves() const override { return ConstraintBatch<K>::curvedAtAll(); }
+  bool          hasGeometricStiffness() const override { return ConstraintBatch<K>::curvedAtAll(); }
   int           rows() const override { return K::rows; }
   unsigned char active(PetscInt e) const override { return this->all[e].active & ((1u << K::rows) - 1); }
   void          setActive(PetscInt e, unsigned char a) override { this->all[e].active = a; }
   bool          drivenAngle(PetscInt e, double t, double *x) const override
   {
-    if constexpr (K::says_angle) *x = K::angleAt(this->all[e].data, t);
+    if constexpr (K::prescribes_angle) *x = K::angleAt(this->all[e].data, t);
     (void)e, (void)t, (void)x;
-    return K::says_angle;
+    return K::prescribes_angle;
   }
   void          describe(const SceneData &s, PetscInt e, double t, DescribedRows &rows) const override { DescribeRows<K>(s, this->all[e], t, rows); }
 
@@ -164,21 +164,21 @@ public:
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
   {
     placeAll<ForceBatch<K>>(l, batches, false);
-    if constexpr (K::carriable) placeAll<ForceStateBatch<K>>(l, batches, true);
+    if constexpr (K::may_be_force_states) placeAll<ForceStateBatch<K>>(l, batches, true);
   }
 
 private:
-  template <class B> void placeAll(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches, bool carried) const
+  template <class B> void placeAll(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches, bool as_force_states) const
   {
     auto                  *batch = new B;
     std::unique_ptr<Batch> owner(batch);
     batch->bodies   = l.bodies;
     batch->of.store = this;
     for (PetscInt e = 0; e < this->size(); e++) {
-      if (this->all[e].carried != carried || !l.needed(*this, e)) continue;
+      if (this->all[e].as_force_states != as_force_states || !l.needed(*this, e)) continue;
       ForceInstance<K> i;
       StoreOf<K>::place(l, this->all[e], i);
-      if (carried) {
+      if (as_force_states) {
         i.state       = l.local(this->start[e]);
         i.state_group = l.group(this->start[e], K::count);
       }
@@ -192,7 +192,7 @@ private:
   {
     ForceInstance<K> i;
     this->place(l, this->all[e], i);
-    if (this->all[e].carried) i.state = l.local(this->start[e]);
+    if (this->all[e].as_force_states) i.state = l.local(this->start[e]);
     return std::unique_ptr<Probe>(new ForceProbe<K>(i));
   }
 };
@@ -246,7 +246,7 @@ void ElementBuilder::load(std::initializer_list<Marker> markers, const typename 
   auto        &s = store<ForceStore<K>>();
   Described<K> d;
   d.element = (PetscInt)data_.elements.size();
-  d.carried = state;
+  d.as_force_states = state;
   std::size_t k = 0;
   for (Marker m : markers) d.marker[k++] = m.id;
   for (std::size_t i = 0; i < inputs.size() && i < (std::size_t)K::inputs; i++) d.input[i] = inputs[i];

@@ -1,4 +1,4 @@
-/* The scene as a problem of PETSc's TS. */
+/* The callbacks and the run that connect a scene to PETSc's TS. */
 #include "hhtdae/analyses.h"
 #include "extension.h"
 #include "guard.h"
@@ -11,9 +11,9 @@ namespace hhtdae
 namespace
 {
 
-/* TSHHT3 tells of accepted states itself. Of other types, whose state is the last accepted one while they solve for the next, the number of steps
-   tells. Velocities of local rotations are not the derivatives of what TSHHT3 alone counts anew in every step. */
-PetscErrorCode FollowType(TS ts, Runtime &R)
+/* Other TS types than TSHHT3 do not report accepted states: a changed number of steps does, since their solution is the last accepted state while they solve for the next.
+   Local rotation vectors need TSHHT3, which renews their references in every step. */
+PetscErrorCode FollowAcceptedSteps(TS ts, Runtime &R)
 {
   PetscBool ours;
   TSType    type;
@@ -21,15 +21,15 @@ PetscErrorCode FollowType(TS ts, Runtime &R)
   PetscReal t;
   Vec       U, V;
   PetscFunctionBegin;
-  if (!R.turns && !R.remembers && !R.dropped) PetscFunctionReturn(0); /* nothing to follow; questions are for TSHHT3 alone */
+  if (!R.rotates_in_space && !R.has_memory && !R.dropped) PetscFunctionReturn(0); /* nothing depends on accepted states; queries need TSHHT3 */
   PetscCall(TSGetType(ts, &type));
   PetscCall(PetscStrcmp(type, TSHHT3, &ours));
   if (ours) PetscFunctionReturn(0);
-  PetscCheck(!R.turns || !R.bodies.local, R.scene.comm, PETSC_ERR_ARG_INCOMP,
+  PetscCheck(!R.rotates_in_space || !R.bodies.local, R.scene.comm, PETSC_ERR_ARG_INCOMP,
              "The scene has bodies that turn in space, whose local rotation vectors TS type %s cannot follow: use Euler angles, -scene_rotations euler313", type);
   PetscCall(TSGetStepNumber(ts, &steps));
-  if (steps == R.followed) PetscFunctionReturn(0);
-  R.followed = steps;
+  if (steps == R.followed_steps) PetscFunctionReturn(0);
+  R.followed_steps = steps;
   PetscCall(TSGetTime(ts, &t));
   PetscCall(TS2GetSolution(ts, &U, &V));
   PetscCall(Remember(R, U, V));
@@ -40,7 +40,7 @@ PetscErrorCode FollowType(TS ts, Runtime &R)
 PetscErrorCode I2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
 {
   PetscFunctionBegin;
-  PetscCall(FollowType(ts, *static_cast<Runtime *>(ctx)));
+  PetscCall(FollowAcceptedSteps(ts, *static_cast<Runtime *>(ctx)));
   PetscCall(Guarded([&] { return Residual(*static_cast<Runtime *>(ctx), t, U, V, A, F); }));
   PetscFunctionReturn(0);
 }
@@ -51,7 +51,7 @@ PetscErrorCode I2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv,
   PetscReal factor = 0;
   Vec       begin;
   PetscFunctionBegin;
-  if (R.turns && R.bodies.local) PetscCall(TSHHT3GetRotationFactor(ts, &factor, &begin));
+  if (R.rotates_in_space && R.bodies.local) PetscCall(TSHHT3GetRotationFactor(ts, &factor, &begin));
   if (factor > 0) PetscCall(NoteBeginning(R, begin));
   R.bodies.commutator = sv * factor;
   const PetscErrorCode failed = Guarded([&] { return Jacobian(R, t, U, V, A, sv, sa, P); });
@@ -64,24 +64,24 @@ PetscErrorCode I2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv,
   PetscFunctionReturn(0);
 }
 
-/* The scene belongs to what -ts_view shows */
+/* -ts_view shows the scene, too */
 PetscErrorCode ViewWithTS(const Runtime &R, TS ts)
 {
   PetscOptions      options;
   PetscViewer       viewer;
   PetscViewerFormat format;
   const char       *prefix;
-  PetscBool         asked;
+  PetscBool         requested;
   PetscFunctionBegin;
   PetscCall(PetscObjectGetOptions((PetscObject)ts, &options));
   PetscCall(PetscObjectGetOptionsPrefix((PetscObject)ts, &prefix));
-  PetscCall(PetscOptionsGetViewer(PetscObjectComm((PetscObject)ts), options, prefix, "-ts_view", &viewer, &format, &asked));
-  if (asked) PetscCall(ViewScene(*R.model, &R, viewer));
+  PetscCall(PetscOptionsGetViewer(PetscObjectComm((PetscObject)ts), options, prefix, "-ts_view", &viewer, &format, &requested));
+  if (requested) PetscCall(ViewScene(*R.model, &R, viewer));
   PetscCall(PetscViewerDestroy(&viewer));
   PetscFunctionReturn(0);
 }
 
-/* The end of the last step, which no other begins at */
+/* Checks dropped rows at the end of the last step; all others are checked at the beginning of the next */
 PetscErrorCode CheckEnd(Runtime &R, TS ts)
 {
   PetscReal t;
@@ -93,9 +93,9 @@ PetscErrorCode CheckEnd(Runtime &R, TS ts)
   PetscFunctionReturn(0);
 }
 
-/* With -ts_exact_final_time interpolate PETSc writes the solution at the final time into a vector of the caller's, and nowhere
-   without one. Here the TS itself has it at the end, with its velocities and time. */
-PetscErrorCode Solve(TS ts)
+/* With -ts_exact_final_time interpolate PETSc writes the solution at the final time only into a vector of the caller. Here it becomes the solution of the TS,
+   with its velocities and time. */
+PetscErrorCode SolveWithFinalTime(TS ts)
 {
   TSExactFinalTimeOption option;
   Vec                    U, V, u = nullptr;
@@ -140,8 +140,8 @@ PetscErrorCode DestroyRun(void **run)
 }
 #endif
 
-/* The TS owns the run */
-PetscErrorCode GiveTo(TS ts, std::unique_ptr<Runtime> R)
+/* Attaches the run to the TS, which destroys it */
+PetscErrorCode AttachToTS(TS ts, std::unique_ptr<Runtime> R)
 {
   PetscContainer box;
   PetscFunctionBegin;
@@ -153,12 +153,12 @@ PetscErrorCode GiveTo(TS ts, std::unique_ptr<Runtime> R)
   PetscFunctionReturn(0);
 }
 
-/* For iterative solvers, -pc_type hhtconstraint */
-PetscErrorCode TellNodes(const Runtime &R, TS ts)
+/* Nodes of extensions, for the preconditioner -pc_type hhtconstraint */
+PetscErrorCode SetNodesOfExtensions(const Runtime &R, TS ts)
 {
   std::vector<PetscInt> rows;
   IS                    nodes;
-  Vec                   zero; /* coordinates of nodes are positions */
+  Vec                   zero; /* positions of the nodes at zero coordinates: the coordinates themselves are positions */
   PetscFunctionBegin;
   if (R.scene.extensions.empty()) PetscFunctionReturn(0);
   for (const auto &x : R.scene.extensions)
@@ -190,7 +190,7 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscCall(CheckUnchanged(data(), start_));
   PetscCall(CreateRun(model_, ts));
   PetscCall(ExpectOutput(*ts, output_));
-  if (model_->continues) PetscFunctionReturn(0); /* createTS(ts, from) projects what the run begins with */
+  if (model_->continues) PetscFunctionReturn(0); /* createTS(ts, from) projects the initial state */
   PetscErrorCode failed = 0;
   if (data().start.equilibrium) failed = Guarded([&] { return StartWithMotions(*ts); });
   else if (LeftToDeform(data())) failed = AssembleAt(*ts, data().start.time);
@@ -223,12 +223,12 @@ PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts)
   PetscCall(VecDuplicate(U, &F));
   PetscCall(InitialState(R, U, V));
   PetscCall(TSCreate(R.scene.comm, ts));
-  PetscCall(GiveTo(*ts, std::move(run)));
+  PetscCall(AttachToTS(*ts, std::move(run)));
   PetscCall(TSSetProblemType(*ts, TS_NONLINEAR));
   PetscCall(TSSetType(*ts, TSHHT3));
   PetscCall(TSSetI2Function(*ts, F, I2Function, &R));
   PetscCall(TSSetI2Jacobian(*ts, R.J, R.J, I2Jacobian, &R));
-  PetscCall(TellNodes(R, *ts));
+  PetscCall(SetNodesOfExtensions(R, *ts));
   PetscCall(TSSetTime(*ts, R.scene.start.time));
   PetscCall(TS2SetSolution(*ts, U, V));
   PetscCall(TSSetExactFinalTime(*ts, TS_EXACTFINALTIME_MATCHSTEP));
@@ -250,8 +250,8 @@ PetscErrorCode Scene::solve(TS ts)
   PetscCall(CheckSame(*R, ts));
   PetscCall(AttachOutput(*R, output_, ts));
   PetscCall(OutputIsAttached(ts));
-  const PetscErrorCode failed = Solve(ts);
-  /* what was sampled before a failure; other ranks may not have failed, so that a collective write could wait for ever */
+  const PetscErrorCode failed = SolveWithFinalTime(ts);
+  /* output sampled before a failure is written on one rank only: if other ranks have not failed, a collective call would wait for ever */
   if (!failed || R->size == 1) PetscCall(FinishOutput(*R));
   PetscCall(failed);
   PetscCall(CheckEnd(*R, ts));

@@ -1,4 +1,4 @@
-/* What the scene consists of, and what its solution does without because the scene has none of it: -scene_view, -ts_view. */
+/* Lists the contents of a scene, and the features that it does not use and that therefore cost nothing: -scene_view, -ts_view. */
 #include "extension.h"
 #include "runtime.h"
 #include "start.h"
@@ -28,7 +28,7 @@ Contents Count(const SceneData &s)
     for (PetscInt e = 0; e < store->size(); e++) n += store->unknowns(e);
     (store->isConstraint() ? c.multipliers : c.forces) += n;
     c.velocities |= store->usesVelocities();
-    c.curved |= store->isConstraint() && store->curves();
+    c.curved |= store->isConstraint() && store->hasGeometricStiffness();
   }
   return c;
 }
@@ -62,7 +62,7 @@ PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer)
   without(c.flexible, "flexible bodies");
   without(c.turning, "rotations in space and gyroscopic terms");
   if (R) {
-    without(R->remembers, "angles over full turns");
+    without(R->has_memory, "angles over full turns");
     without(R->uses_acceleration, "accelerations in definitions");
     without((bool)R->recorder, "output");
   }
@@ -72,7 +72,7 @@ PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer)
                                    (int)M.number.first.back(), (int)c.multipliers, (int)c.forces, (int)s.variables.size(), (int)s.states.size()));
   if (c.flexible) PetscCall(PetscViewerASCIIPrintf(viewer, "  modal coordinates of flexible bodies: %d\n", (int)c.modes));
   if (c.turning) PetscCall(PetscViewerASCIIPrintf(viewer, "  rotations: %s\n", s.start.rotations == Rotations::Local ? "local rotation vectors" : "Euler angles"));
-  if (R && R->turns && !R->bodies.local) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R->reframed));
+  if (R && R->rotates_in_space && !R->bodies.local) PetscCall(PetscViewerASCIIPrintf(viewer, "  changes of the axes of Euler angles, own bodies: %d\n", (int)R->axes_changes));
   if (!left.empty()) PetscCall(PetscViewerASCIIPrintf(viewer, "  left out: %s\n", left.c_str()));
   PetscFunctionReturn(0);
 }

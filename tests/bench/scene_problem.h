@@ -159,7 +159,7 @@ public:
   {
     hhtdae::Runtime &R = run();
     R.bodies.move(u, v);
-    if (!R.remembers) return;
+    if (!R.has_memory) return;
     for (auto &b : R.batches) b->accept(R.bodies);
   }
 
@@ -182,7 +182,7 @@ public:
 
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override
   {
-    const bool remembers = run().remembers;
+    const bool remembers = run().has_memory;
     if (remembers && t > last_.t && !last_.u.empty()) accept(last_.u.data(), last_.v.data());
     if (evaluate(t, u, v, a, f)) std::fill_n(f, n, std::nan("")); /* PETSc has printed what is wrong */
     if (!remembers || !std::all_of(u, u + n, [](double x) { return std::isfinite(x); })) return;

@@ -13,7 +13,7 @@ namespace hhtdae
 namespace
 {
 
-/* A load case of one body, at a state of the body */
+/* A load case of one body, evaluated at a state of the body */
 struct CaseOnBody {
   PetscInt             body = -1; /* local */
   const ModalLoadCase *load = nullptr;
@@ -42,7 +42,7 @@ public:
     CaseOnBody    on;
     LocalFunction scale;
     Input         state; /* the scale as a force state */
-    bool          carried;
+    bool          as_force_states;
   };
   std::vector<Instance> all;
   InstancesOf           of;
@@ -54,9 +54,9 @@ public:
     for (Instance &e : all) {
       const PetscInt g = bodies_.body[e.on.body].group;
       for (const auto &block : own(*e.on.load)) request_.push_back(p.need(g + block[0], g + block[1]));
-      if (!e.carried) e.scale.arguments.connect(bodies_, p);
+      if (!e.as_force_states) e.scale.arguments.connect(bodies_, p);
       for (int row = 0; row < 3; row++) {
-        if (e.carried) request_.push_back(p.need(g + row, e.state.group));
+        if (e.as_force_states) request_.push_back(p.need(g + row, e.state.group));
         for (const Columns::Part &c : e.scale.arguments.columns().parts) request_.push_back(p.need(g + row, c.group));
       }
     }
@@ -66,7 +66,7 @@ public:
   {
     for (const Instance &e : all) {
       double s = 0;
-      if (e.carried) s = ev.input(e.state);
+      if (e.as_force_states) s = ev.input(e.state);
       else e.scale.value(ev, &s);
       apply(ev, e, s, e.on.at(ev));
     }
@@ -78,7 +78,7 @@ public:
     for (const Instance &e : all) {
       const CaseOnBody::Value x = e.on.at(ev);
       double                  s = 0;
-      if (e.carried) s = ev.input(e.state);
+      if (e.as_force_states) s = ev.input(e.state);
       else e.scale.gradient(ev, &s, G_);
       apply(ev, e, s, x);
       ownBlocks(ev, e, s, x, slot);
@@ -121,7 +121,7 @@ private:
     ev.bodies.modal[ev.bodies.body[e.on.body].modal].load += s * x.q;
   }
 
-  /* - d load by the body's coordinates; what its angles make of the whole moment the body adds itself */
+  /* - d load by the body's coordinates, without d(G^T m)/dq of the moment, which the body adds itself */
   static void ownBlocks(Evaluation &ev, const Instance &e, double s, const CaseOnBody::Value &x, const Slot *&slot)
   {
     const BodyMotion    &b = ev.bodies.now[e.on.body];
@@ -135,20 +135,20 @@ private:
     if (l.modal_gradient.size()) ev.sink.add(*slot++, Eigen::MatrixXd(-s * l.modal_gradient), m, m);
   }
 
-  /* - the load of scale one, times the derivatives of the scale */
+  /* minus the load for scale 1, times the derivatives of the scale */
   void scaleColumns(Evaluation &ev, const Instance &e, const CaseOnBody::Value &x, const Slot *&slot) const
   {
     const BodyMotion     &b       = ev.bodies.now[e.on.body];
     const Eigen::VectorXd rows[3] = {-x.f, -b.G.transpose() * x.m, -x.q};
     for (const Eigen::VectorXd &row : rows) {
-      if (e.carried) ev.sink.add((slot++)->column(e.state.offset), row, (int)row.size(), 1);
+      if (e.as_force_states) ev.sink.add((slot++)->column(e.state.offset), row, (int)row.size(), 1);
       for (const Columns::Part &c : e.scale.arguments.columns().parts)
         ev.sink.add(*slot++, Eigen::MatrixXd(row * G_.middleCols(c.start, c.size)), (int)row.size(), c.size);
     }
   }
 };
 
-/* The scale, and the load on the floating frame */
+/* The scale as a component, and the load on the floating frame, for measures */
 class ModalLoadProbe : public Probe
 {
 public:
@@ -181,7 +181,7 @@ public:
   struct Item {
     PetscInt                element = -1, marker = -1, load = -1;
     std::vector<Expression> scale;
-    bool                    carried = false;
+    bool                    as_force_states = false;
   };
   std::vector<Item> all;
 
@@ -190,7 +190,7 @@ public:
   PetscInt      marker(PetscInt e, int) const override { return all[e].marker; }
   PetscInt      element(PetscInt e) const override { return all[e].element; }
   int           rows() const override { return 1; }
-  bool          carried(PetscInt e) const override { return all[e].carried; }
+  bool          asForceStates(PetscInt e) const override { return all[e].as_force_states; }
 
   const std::vector<Expression> *expressions(PetscInt e) const override { return &all[e].scale; }
 
@@ -203,8 +203,8 @@ public:
       if (!l.needed(*this, e)) continue;
       ModalLoadBatch::Instance i;
       i.on      = onBody(l, e);
-      i.carried = all[e].carried;
-      if (i.carried) {
+      i.as_force_states = all[e].as_force_states;
+      if (i.as_force_states) {
         i.state = l.input({ScalarRef::ForceState, all[e].element, 0});
         if (OwnerOf(*l.run->model, *this, e) == l.run->rank) rows->add(ExpressionBatch::Definition, function(l, e), l.local(start[e]), l.group(start[e], 1));
       } else
@@ -219,7 +219,7 @@ public:
   std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override
   {
     const PetscInt marker = l.marker(all[e].marker);
-    return std::make_unique<ModalLoadProbe>(marker, onBody(l, e), function(l, e), all[e].carried ? l.local(start[e]) : -1);
+    return std::make_unique<ModalLoadProbe>(marker, onBody(l, e), function(l, e), all[e].as_force_states ? l.local(start[e]) : -1);
   }
 
 private:
@@ -238,7 +238,7 @@ template <> Element Scene::enter(const std::string &name, const ModalLoad &x)
 {
   SceneData &s        = data();
   const bool flexible = s.valid(x.body) && s.bodies[x.body.id].flexible;
-  if (!flexible) { /* without a marker that it could be at */
+  if (!flexible) { /* there is no marker at which to enter it */
     const Element none = absent(name);
     s.errors.push_back("modal load " + s.elements[none.id].name + ": its body is not a flexible one of this scene");
     return none;
@@ -253,7 +253,7 @@ template <> Element Scene::enter(const std::string &name, const ModalLoad &x)
   item.load    = m.load(x.load);
   item.marker  = at.id;
   item.scale   = {x.scale};
-  item.carried = x.state || NeedsAcceleration(x.scale);
+  item.as_force_states = x.state || NeedsAcceleration(x.scale);
   e.require(item.load >= 0, s.bodyName(x.body.id) + " has no load case " + x.load + (known.empty() ? ", in fact none" : ", but " + known));
   e.put<ModalLoadStore>(std::move(item));
   return e.done();

@@ -1,7 +1,7 @@
 /*
-  User's forces. Components are expressions: by default eliminated, so that a load depends on all that the expressions
-  read; with `state = true` carried as force states with rows F - f(...) = 0. Components that read accelerations are
-  always carried, because an equation of motion has to be affine in q'', which is what the integrator makes use of.
+  Users' forces. Components are expressions, by default evaluated in the equations of motion, which then depend on all arguments of the
+  expressions; with `state = true` they are force states with rows F - f(...) = 0. Components that read accelerations are
+  always force states, because the integrator requires equations of motion that are affine in q''.
 */
 #include "requirements.h"
 #include "scene/expression_batch.h"
@@ -18,11 +18,11 @@ template <class K> struct UserItem {
   PetscInt                element = -1;
   PetscInt                marker[K::markers];
   std::vector<Expression> expressions;
-  bool                    carried;
+  bool                    as_force_states;
   typename K::Data        data;
 };
 
-/* Components eliminated: the kernel's inputs are functions of the unknowns */
+/* Without force states: the inputs of the kernel are functions of the unknowns */
 template <class K> class UserBatch : public ReadingBatch<ForceBatchBase<K>>
 {
   using Base = ForceBatchBase<K>;
@@ -122,7 +122,7 @@ private:
   }
 };
 
-/* Values of the components, for measures, and the loads that they stand for */
+/* Values and loads of the components, for measures */
 template <class K> class UserProbe : public Probe
 {
 public:
@@ -160,14 +160,14 @@ public:
   PetscInt      element(PetscInt e) const override { return all[e].element; }
   bool          loads(int k) const override { return Depends(K::acts, 2 * k) || Depends(K::acts, 2 * k + 1); }
   int           rows() const override { return K::count; }
-  bool          carried(PetscInt e) const override { return all[e].carried; }
+  bool          asForceStates(PetscInt e) const override { return all[e].as_force_states; }
 
   const std::vector<Expression> *expressions(PetscInt e) const override { return &all[e].expressions; }
 
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
   {
     auto eliminated    = std::make_unique<UserBatch<K>>();
-    auto loads         = std::make_unique<ForceBatch<K>>(); /* of force states */
+    auto loads         = std::make_unique<ForceBatch<K>>(); /* loads of instances with force states */
     auto rows          = std::make_unique<ExpressionBatch>(*l.bodies);
     eliminated->bodies = loads->bodies = l.bodies;
     eliminated->of.store               = this;
@@ -176,7 +176,7 @@ public:
       ForceInstance<K> i;
       for (int k = 0; k < K::markers; k++) i.marker[k] = l.marker(all[e].marker[k]);
       i.data = all[e].data;
-      if (!all[e].carried) {
+      if (!all[e].as_force_states) {
         eliminated->all.push_back(i);
         eliminated->functions.push_back(function(l, e));
         eliminated->of.add(e);
@@ -197,7 +197,7 @@ public:
     ForceInstance<K> i;
     for (int k = 0; k < K::markers; k++) i.marker[k] = l.marker(all[e].marker[k]);
     i.data = all[e].data;
-    if (all[e].carried) i.state = l.local(start[e]);
+    if (all[e].as_force_states) i.state = l.local(start[e]);
     return std::make_unique<UserProbe<K>>(i, function(l, e));
   }
 
@@ -217,15 +217,15 @@ void Enter(ElementBuilder &e, const std::vector<Marker> &markers, const typename
   UserItem<K> item;
   for (int k = 0; k < K::markers; k++) item.marker[k] = markers[k].id;
   item.data    = data;
-  item.carried = state;
-  for (const Expression &x : f) item.carried |= NeedsAcceleration(x);
+  item.as_force_states = state;
+  for (const Expression &x : f) item.as_force_states |= NeedsAcceleration(x);
   item.expressions = std::move(f);
   e.put<UserStore<K>>(std::move(item));
 }
 
 } // namespace
 
-/* A planar scene has forces in its plane and moments about z: the others of user's forces are none. One that is plainly not zero is an error. */
+/* A planar scene has forces in its plane and moments about z: other components of users' forces are dropped; it is an error if they are constants other than zero. */
 static void LeaveInPlane(ElementBuilder &e, std::vector<Expression> &force, std::vector<Expression> &moment)
 {
   const auto leave = [&](Expression &x, const char *what) {
@@ -243,7 +243,7 @@ static void LeaveInPlane(ElementBuilder &e, std::vector<Expression> &force, std:
 /* Components as measures and force states: forces first, then moments. */
 template <> Element Scene::enter(const std::string &name, const UserForce &s)
 {
-  /* the builder wants two markers; a force without reaction has one */
+  /* the builder needs two markers; a force without reaction has only one */
   const bool     reaction = s.j.id != -1, framed = s.frame.id != -1;
   ElementBuilder e(*this, name, "user force", ElementData::Force, s.i, reaction ? s.j : Marker{}, reaction);
   UserWrenchData d;

@@ -4,7 +4,7 @@
   tanh(s/v_s) against the slip velocity s of the surfaces, see friction_slip.h; a pin or ball of radius r slips at r
   times the relative angular velocity.
 
-  Left out: what the multipliers of the joint's rotation rows, which are moments, add to the load of a bearing of finite
+  Not modelled: the multipliers of the joint's rotation rows, which are moments, increase the load of a bearing of finite
   length.
 */
 #ifndef HHTDAE_SCENE_KERNELS_FRICTION_H
@@ -21,8 +21,8 @@ struct FrictionData {
   int    axis; /* of j, of the translation */
 };
 
-/* |z|. A force that would round its tip off would be one of the units of force, in which small loads vanish (JointFrictionKernel.GrowsWithTheLoadInAnyUnits);
-   at the tip itself, an unloaded bearing, derivatives are zero, which is between those around it. */
+/* |z|, without smoothing at zero: that would need a force scale, which depends on the unit of force and makes small loads vanish (JointFrictionKernel.GrowsWithTheLoadInAnyUnits).
+   At z = 0, an unloaded bearing, the derivatives are set to zero, the mean of those of opposite directions. */
 template <int Rows, class T> T BearingLoad(const T *z)
 {
   using std::sqrt;
@@ -33,7 +33,7 @@ template <int Rows, class T> T BearingLoad(const T *z)
   return load;
 }
 
-/* velocity of i's origin against j's material there */
+/* velocity of i's origin relative to j's material there */
 template <class T> Vec3<T> SlidingVelocity(const Frame<T> *f, const Twist<T> *w)
 {
   const Vec3<T> x = f[0].x - f[1].x, v = w[0].v - w[1].v, turning = w[1].w.cross(x);
@@ -59,7 +59,7 @@ template <class T> void PlaceMoment(const Vec3<T> &m, Wrench<T> *on)
 
 /* moment about z_j on i: -mu r N tanh(r w/v_s), w the relative angular velocity about z_j */
 template <int Rows> struct RevoluteFriction : Force<RevoluteFriction<Rows>, 2, 1> {
-  static constexpr bool carriable = false;
+  static constexpr bool        may_be_force_states = false;
   static constexpr const char *name    = "friction in a revolute joint";
   static constexpr int         inputs  = Rows;
   static constexpr unsigned    depends = Rotation(0) | Rotation(1), acts = depends;
@@ -80,7 +80,7 @@ template <int Rows> struct RevoluteFriction : Force<RevoluteFriction<Rows>, 2, 1
 
 /* force along an axis of j on i: -mu N tanh(v/v_s) */
 template <int Rows> struct TranslationalFriction : Force<TranslationalFriction<Rows>, 2, 1> {
-  static constexpr bool carriable = false;
+  static constexpr bool        may_be_force_states = false;
   static constexpr const char *name    = "friction in a translational joint";
   static constexpr int         inputs  = Rows;
   static constexpr unsigned    depends = Position(0) | Position(1) | Rotation(1), acts = depends;
@@ -103,7 +103,7 @@ template <int Rows> struct TranslationalFriction : Force<TranslationalFriction<R
 /* force along and moment about z_j on i. The surfaces slip along a helix, at (v, r w): friction mu N has that
    direction, so that a turning shaft slides easily. */
 struct CylindricalFriction : Force<CylindricalFriction, 2, 2> {
-  static constexpr bool carriable = false;
+  static constexpr bool        may_be_force_states = false;
   static constexpr const char *name   = "friction in a cylindrical joint";
   static constexpr int         inputs = 2;
   using Data                          = FrictionData;
@@ -126,7 +126,7 @@ struct CylindricalFriction : Force<CylindricalFriction, 2, 2> {
 
 /* moment on i against the relative angular velocity w, in space axes: -mu r N tanh(r |w|/v_s) w/|w| */
 struct SphericalFriction : Force<SphericalFriction, 2, 3> {
-  static constexpr bool carriable = false;
+  static constexpr bool        may_be_force_states = false;
   static constexpr const char *name    = "friction in a spherical joint";
   static constexpr int         inputs  = 3;
   static constexpr unsigned    depends = Rotation(0) | Rotation(1), acts = depends;

@@ -17,7 +17,7 @@ struct MotionData {
   int          axis = 2; /* of j; of translations alone */
 };
 
-/* ---- what moves: the two kinds share value, rate, gradient and curvature with couplers and springs ---- */
+/* ---- the driven coordinate: value, rate, gradient and curvature are those of couplers and springs ---- */
 
 struct TurnAboutZ {
   static constexpr unsigned depends = Rotation(0) | Rotation(1);
@@ -69,8 +69,8 @@ struct AdvanceAlongAxis {
 
 /* ---- f(t) - displacement = 0 ---- */
 
-/* The angle is unwound to the turn nearest to f(t): the motion itself says how many turns were made, nothing need be
- * remembered. */
+/* The angle is unwound to the turn nearest to f(t), which determines the number of full turns: no memory is
+ * needed. */
 template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> {
   using Data                        = MotionData;
   using Base                        = Constraint<K, 2, 1>;
@@ -96,7 +96,7 @@ template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> 
 
 struct DrivenAngle : DrivenDisplacement<DrivenAngle, TurnAboutZ> {
   static constexpr const char *name       = "driven angle";
-  static constexpr bool        says_angle = true;
+  static constexpr bool        prescribes_angle = true;
   static double                angleAt(const Data &d, double t) { return d.function(t).f; }
 };
 struct DrivenAdvance : DrivenDisplacement<DrivenAdvance, AdvanceAlongAxis> {
@@ -138,7 +138,7 @@ template <class K, class Moves> struct DrivenRate : RateRow<K, Moves> {
   }
 };
 
-/* The function of the motion is the rate of change of w, which is a state of the scene: it is not looked at here. */
+/* w is a first-order state of the scene, whose rate is the function of the motion; it is not evaluated here. */
 template <class K, class Moves> struct StateRate : RateRow<K, Moves> {
   static constexpr int inputs = 1;
 

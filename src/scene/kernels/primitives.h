@@ -1,10 +1,10 @@
 /*
-  Primitive constraints on the origins of two markers, i = frame 0 and j = frame 1. They run in the hottest loops, so
-  gradient and curvature are written out. Signs: the reaction on the bodies is -J^T lambda, and each row is such that
-  its multiplier is the force on i's body in the direction that is named; the opposite force acts on j's body at the
+  Primitive constraints on the origins of two markers, i = frame 0 and j = frame 1. Gradient and curvature are written
+  out for speed. Signs: the reaction on the bodies is -J^T lambda, and each row is such that
+  its multiplier is the force on i's body in the named direction; the opposite force acts on j's body at the
   same point.
 
-  d = x_i - x_j; a turn theta_j of j moves an axis a of j by theta_j x a.
+  d = x_i - x_j; a rotation theta_j of j changes an axis a of j by theta_j x a.
 */
 #ifndef HHTDAE_SCENE_PRIMITIVES_H
 #define HHTDAE_SCENE_PRIMITIVES_H
@@ -19,7 +19,7 @@ template <int R> struct CoincideRows : Constraint<CoincideRows<R>, 2, R> {
   using Base                                  = Constraint<CoincideRows<R>, 2, R>;
   static constexpr const char *name           = R == 3 ? "coincidence" : "coincidence in the plane";
   static constexpr unsigned    depends        = Position(0) | Position(1);
-  static constexpr bool        needs_rotation = false, translates = true;
+  static constexpr bool        needs_rotation = false, purely_translational = true;
   static constexpr bool        curved(int, int) { return false; }
 
   template <class T> static void value(const Empty &, const Frame<T> *f, const T &, T *phi)
@@ -43,7 +43,7 @@ using Coincide  = CoincideRows<3>;
 using Coincide2 = CoincideRows<2>; /* planar scenes */
 
 /*
-  What rows -d . a_r with axes a_r fixed in j share. With u = sum of lambda_r a_r the load J^T lambda is (-u, 0, u, d x
+  Gradient and curvature of rows -d . a_r with axes a_r fixed in j. With u = sum of lambda_r a_r the load J^T lambda is (-u, 0, u, d x
   u).
 */
 inline void AlongAxesGradient(const Vec3<double> &d, const Vec3<double> &a,

@@ -10,7 +10,7 @@ namespace hhtdae
 namespace
 {
 
-/* The scene at time t of the last step: all that the tasks read */
+/* Evaluates the state at time t of the last step and lets the tasks record it */
 PetscErrorCode RecordAt(Recorder &r, TS ts, double t, const std::vector<Task *> &tasks)
 {
   Runtime      &R = r.R;
@@ -36,7 +36,7 @@ PetscErrorCode RecordAt(Recorder &r, TS ts, double t, const std::vector<Task *> 
   PetscFunctionReturn(0);
 }
 
-/* The next time that a task wants, not beyond t but for rounding; infinity if that is later */
+/* The next sample time of a task up to t, with rounding; infinity if it is later */
 double Due(const Recorder &r, const Task &task, double t)
 {
   constexpr double never = std::numeric_limits<double>::infinity();
@@ -46,7 +46,7 @@ double Due(const Recorder &r, const Task &task, double t)
   return due <= t + 1e-9 * task.dt ? std::min(due, t) : never;
 }
 
-/* Samples of the step that ends at t, each time for all tasks that want it */
+/* Takes all samples of the step that ends at t, at each sample time for all tasks that are due */
 PetscErrorCode RecordStep(Recorder &r, TS ts, double t)
 {
   std::vector<Task *> now;
@@ -59,7 +59,7 @@ PetscErrorCode RecordStep(Recorder &r, TS ts, double t)
       next   = std::min(next, due[k]);
     }
     if (next > t) break;
-    ended = next == t; /* tasks of every step would want it for ever */
+    ended = next == t; /* tasks with dt = 0 are due at t only once */
     now.clear();
     for (std::size_t k = 0; k < due.size(); k++)
       if (due[k] == next) now.push_back(r.tasks[k].get());
@@ -190,8 +190,8 @@ Recorder::~Recorder()
   for (Vec *x : {&U, &V, &A}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
 }
 
-/* A checkpoint that was loaded after TSSetUp(), but before there was a recorder, has left its numbers in the vector: the run goes on in the
-   same files. They are zero otherwise, or those of the run that this one goes on from, Scene::createTS(&next, ts): then it has made no step. */
+/* If a checkpoint was loaded after TSSetUp() but before the recorder existed, its numbers are in the vector, and the run continues the
+   same files. Otherwise they are zero, or, after Scene::createTS(&next, ts), those of the other run: then this one has made no step. */
 static PetscErrorCode ResumeFromLoaded(Runtime &R, TS ts, PetscReal t)
 {
   const double *x;
@@ -200,7 +200,7 @@ static PetscErrorCode ResumeFromLoaded(Runtime &R, TS ts, PetscReal t)
   PetscCall(TSGetStepNumber(ts, &steps));
   PetscCall(VecGetLocalSize(R.axes, &n));
   PetscCall(VecGetArrayRead(R.axes, &x));
-  const std::vector<double> stood(x + n - kept + 2, x + n); /* behind the digest, kept.cpp */
+  const std::vector<double> stood(x + n - checkpoint_numbers + 2, x + n); /* behind the digest, kept.cpp */
   PetscCall(VecRestoreArrayRead(R.axes, &x));
   if (steps && stood[0] && stood[2] == t) PetscCall(ResumeOutput(R, stood.data()));
   PetscFunctionReturn(0);
@@ -289,7 +289,7 @@ PetscErrorCode SaveOutput(Runtime &R, double *x)
   PetscFunctionReturn(0);
 }
 
-/* At the state of the checkpoint. What was not recorded before begins at the next of its times, in the grid of the others. */
+/* Resumes at the state of a checkpoint. Tasks that it does not contain begin at their next sample time, counted from the same first sample. */
 PetscErrorCode ResumeOutput(Runtime &R, const double *x)
 {
   PetscFunctionBegin;

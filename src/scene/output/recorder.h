@@ -1,5 +1,5 @@
 /*
-  A run as it is recorded. A monitor of the TS calls every task at the times it wants, within the step that was just accepted and at
+  Records results of a run. A monitor of the TS calls every task at its sample times within the step that was just accepted and at
   its end, with the bodies moved to that time.
 */
 #ifndef HHTDAE_SCENE_OUTPUT_RECORDER_H
@@ -15,27 +15,27 @@ class Task
 public:
   explicit Task(double dt) : dt(dt) {}
   virtual ~Task() = default;
-  virtual PetscErrorCode record(Runtime &R, Evaluation &e) = 0; /* collective, as all of them */
+  virtual PetscErrorCode record(Runtime &R, Evaluation &e) = 0; /* adds a sample; all functions are collective */
   virtual PetscErrorCode stepped(Runtime &) { return 0; }       /* after the samples of a step */
   virtual PetscErrorCode finish(Runtime &) { return 0; }        /* at the end of a solve; there may be another one */
-  virtual int            slot() const = 0;                      /* which of the numbers of a checkpoint are its own */
-  virtual PetscErrorCode save(Runtime &R, double *x)         = 0; /* brings files up to date, and notes where they end */
-  virtual PetscErrorCode resume(Runtime &R, const double *x) = 0; /* shortens files to that, and goes on behind it */
+  virtual int            slot() const                        = 0; /* number of its block of task_numbers values in a checkpoint */
+  virtual PetscErrorCode save(Runtime &R, double *x)         = 0; /* writes all samples to the files and stores their lengths in x */
+  virtual PetscErrorCode resume(Runtime &R, const double *x) = 0; /* truncates the files to these lengths and continues there */
 
-  double dt;       /* 0: the end of every step */
-  double done = 0; /* times between samples since the recording began: a sample for each, but for one that began later */
-  bool   from_equations = false; /* it reads accelerations, multipliers or what depends on them */
+  double dt;                     /* time between samples, s; 0: the end of every step */
+  double done           = 0;     /* number of sample times so far since the recording began, also if this task began later */
+  bool   from_equations = false; /* it reads accelerations, multipliers or quantities that depend on them */
 };
 
-/* Numbers of a checkpoint for each task */
+/* Number of tasks, and of values in a checkpoint for each */
 constexpr int task_slots = 4, task_numbers = 15;
-static_assert(recorded >= 4 + task_slots * (task_numbers + 1), "room for all tasks");
+static_assert(recorder_numbers >= 4 + task_slots * (task_numbers + 1), "room for all tasks");
 
 struct Recorder {
   Runtime                           &R;
-  bool                               dense = true;  /* TSHHT3: values between the ends of steps, accelerations */
+  bool                               dense = true; /* the TS is TSHHT3, which has values between the ends of steps, and accelerations */
   bool                               begun = false;
-  double                             begin = 0, last = 0; /* time of the first sample, of the end of the last step seen */
+  double                             begin = 0, last = 0; /* times of the first sample and of the end of the last recorded step */
   Vec                                U = nullptr, V = nullptr, A = nullptr;
   std::vector<double>                acceleration; /* of the local unknowns */
   std::vector<std::unique_ptr<Task>> tasks;
@@ -44,7 +44,7 @@ struct Recorder {
   ~Recorder();
 };
 
-/* What there is to record; null if it was not asked for */
+/* Create the tasks; null if the output was not requested */
 PetscErrorCode MakeTable(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task);     /* table.cpp */
 PetscErrorCode MakeAnimation(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task); /* animation.cpp */
 PetscErrorCode MakeBalanceSheet(Runtime &R, const OutputSettings &o, std::unique_ptr<Task> &task); /* balance.cpp */
