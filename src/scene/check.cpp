@@ -1,4 +1,4 @@
-/* What can be wrong with a description, found before anything is numbered and reported all at once. */
+/* Checks of a description before unknowns are numbered; all errors are reported at once. */
 #include "extension.h"
 #include "measures.h"
 #include "runtime.h"
@@ -12,7 +12,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr double angle_tolerance = 1e-8; /* of directions that have to be exact */
+constexpr double angle_tolerance = 1e-8; /* of lengths, velocities and axes that must be exactly zero, unit or parallel, in their units: rounding of the description */
 
 std::string Text(const Vector3 &x) { return Show(x(0)) + ", " + Show(x(1)) + ", " + Show(x(2)); }
 
@@ -107,7 +107,7 @@ private:
   {
     const MarkerData &m = s_.markers[id];
     if (!s_.planar || m.body < -1 || !m.s.allFinite() || !m.R.allFinite())
-      return; /* those were named when they were made */
+      return; /* reported when they were made */
     const auto        name = s_.marker_names.find(id);
     const std::string who =
         "marker " + (name == s_.marker_names.end() ? std::to_string(id) + " on " + s_.bodyName(m.body) : name->second);
@@ -119,11 +119,11 @@ private:
 
   void element(const ElementData &e)
   {
-    if (!s_.valid(e.i) || !s_.valid(e.j)) return; /* named when it was made */
+    if (!s_.valid(e.i) || !s_.valid(e.j)) return; /* reported when it was made */
     const PetscInt i = s_.markers[e.i.id].body, j = s_.markers[e.j.id].body;
     if (i < -1 || j < -1 || i != j) return;
     const std::string who = std::string(e.type) + " " + e.name;
-    if (e.kind == ElementData::Force) return; /* does nothing, harms nothing */
+    if (e.kind == ElementData::Force) return; /* a force on a single body has no effect */
     for (const std::string &known : s_.errors)
       if (known.compare(0, who.size() + 1, who + ":") == 0) return;
     require(false, who,
@@ -159,7 +159,7 @@ private:
 namespace
 {
 
-/* All of them as one error, as far as PETSc's message has room */
+/* Reports all errors as one, up to the length of PETSc's messages */
 PetscErrorCode Report(const SceneData &s, const std::vector<std::string> &errors, const char *what)
 {
   std::string       all;
@@ -186,7 +186,7 @@ PetscErrorCode CheckDescription(SceneData &s)
   PetscFunctionReturn(0);
 }
 
-/* What was added or changed since setUp() */
+/* An error if anything was added or changed since setUp() */
 PetscErrorCode CheckUnchanged(const SceneData &s, const StartPolicy &start)
 {
   PetscFunctionBegin;

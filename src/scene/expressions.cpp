@@ -1,5 +1,4 @@
-/* User-defined variables and first-order states: who owns them, where their expressions find their arguments, what can
- * be wrong. */
+/* User-defined variables and first-order states: their owners, the local arguments of their expressions, and checks. */
 #include "expression_batch.h"
 #include "kernels/marker_measure.h"
 #include "runtime.h"
@@ -11,7 +10,7 @@ namespace hhtdae
 namespace
 {
 
-/* The rank of a measure's first body or element; -1 if it has none */
+/* Owner of a measure's first body or element; -1 if it has none */
 PetscMPIInt OwnerOf(const Model &M, const Measure &m)
 {
   const SceneData &s = M.scene;
@@ -33,7 +32,7 @@ void AddRow(Localizer &l, ExpressionBatch &batch, ExpressionBatch::Kind kind, co
 /* the same on every rank */
 bool UsesAcceleration(const SceneData &s)
 {
-  if (!s.extensions.empty()) return true; /* mass that couples coordinates of several ranks */
+  if (!s.extensions.empty()) return true; /* their mass matrix couples coordinates of several ranks */
   for (const auto *list : {&s.variables, &s.states})
     for (const ExpressionData &d : *list)
       if (NeedsAcceleration(d.expression)) return true;
@@ -52,7 +51,7 @@ MarkerMotion<double> Described(const SceneData &s, Marker m)
 
 bool DescribedValue(const SceneData &s, const Expression &e, double t, std::size_t depth, double *x);
 
-/* A measure where the description puts the bodies; false if it is not one of time, positions, velocities, states and variables of these */
+/* Value of a measure at the described poses; false if it depends on more than time, positions, velocities, states and variables of these */
 bool DescribedValue(const SceneData &s, const Measure &m, double t, std::size_t depth, double *x)
 {
   if (m.kind == Measure::Time) *x = t;
@@ -76,7 +75,7 @@ bool DescribedValue(const SceneData &s, const Measure &m, double t, std::size_t 
 bool DescribedValue(const SceneData &s, const Expression &e, double t, std::size_t depth, double *x)
 {
   double m[Real::most];
-  if (depth > s.variables.size() || e.arguments.size() > Real::most || !e.f) return false; /* variables that read each other */
+  if (depth > s.variables.size() || e.arguments.size() > Real::most || !e.f) return false; /* depth: variables that read each other */
   for (std::size_t k = 0; k < e.arguments.size(); k++)
     if (!DescribedValue(s, e.arguments[k], t, depth, m + k)) return false;
   *x = UserFunction("variable", e).value(m);
@@ -120,7 +119,7 @@ PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l)
   PetscFunctionReturn(0);
 }
 
-/* ---- what can be wrong ---- */
+/* ---- checks ---- */
 
 namespace
 {
@@ -153,7 +152,7 @@ std::string CheckModal(const SceneData &s, const Measure &m)
   return m.component >= 0 && m.component < n ? "" : s.bodies[m.target].name + " has modes 0 to " + std::to_string(n - 1) + ", not " + std::to_string(m.component);
 }
 
-/* A load is read where the body is that it acts on */
+/* A measure of a load needs a body on which the element acts */
 std::string CheckLoad(const SceneData &s, const Measure &m)
 {
   if (!s.valid(Element{m.target, m.scene})) return "its element is not one of this scene; add it first";
@@ -171,7 +170,7 @@ std::string CheckElement(const SceneData &s, const Measure &m, bool in_equation)
   const ElementData &e       = s.elements[m.target];
   const std::string  who     = std::string(e.type) + " " + e.name;
   const bool         of_load = m.kind == Measure::Component;
-  if (e.parts.empty()) return ""; /* absent, or with errors of its own */
+  if (e.parts.empty()) return ""; /* the element is absent or has errors that are reported separately */
   if (of_load != (e.kind == ElementData::Force))
     return who + (of_load ? " is not a force" : " is not a joint or motion");
   if (in_equation && e.parts[0].store->isExplicit()) return who + " is a function of the state without equations of its own, and its reaction for output alone";

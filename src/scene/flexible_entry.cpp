@@ -57,19 +57,19 @@ bool Finite(const ModalBody &m)
   return good;
 }
 
-/* What of the modes moves the body as a whole, which a constant mass matrix has no place for */
+/* Largest coupling of a mode with rigid motion, relative to mass and size, which a constant mass matrix neglects */
 double RigidContent(const ModalBody &m)
 {
   const double size = std::sqrt(m.moments.trace() / m.mass), scale = std::sqrt(m.mass);
-  double       most = m.first.size() ? m.first.cwiseAbs().maxCoeff() / scale : 0;
+  double       largest = m.first.size() ? m.first.cwiseAbs().maxCoeff() / scale : 0;
   for (int c = 0; c < 3 && m.modes(); c++) {
     const int d = (c + 1) % 3;
-    most        = std::max(most, (m.moment[c].row(d) - m.moment[d].row(c)).cwiseAbs().maxCoeff() / (scale * size));
+    largest     = std::max(largest, (m.moment[c].row(d) - m.moment[d].row(c)).cwiseAbs().maxCoeff() / (scale * size));
   }
-  return most;
+  return largest;
 }
 
-/* empty: nothing is wrong */
+/* Error of the model as text, empty if there is none */
 std::string FaultOfModel(const FlexibleBody &b, bool planar)
 {
   if (!b.model) return "it has no model; give a ModalBody";
@@ -87,7 +87,7 @@ std::string FaultOfModel(const FlexibleBody &b, bool planar)
   return "";
 }
 
-/* of what is said beside a model that is right */
+/* Error of the other data, if the model is right */
 std::string FaultOfValues(const FlexibleBody &b)
 {
   const PetscInt n = b.model->modes();
@@ -190,7 +190,7 @@ Body Scene::frameAt(Body body, PetscInt place)
   return addFrame(body, place);
 }
 
-/* The frame starts where the deformation at the start has its point */
+/* The frame starts at the deformed position of its point */
 Body Scene::addFrame(Body body, PetscInt a)
 {
   SceneData             &s = data();

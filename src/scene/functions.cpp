@@ -46,7 +46,7 @@ Value Quintic(double s, double d)
   return {d * s * s * s * (10 + s * (6 * s - 15)), d * 30 * s * s * r * r, d * 60 * s * r * (r - s)};
 }
 
-/* From x0 before t0 to x1 after t1; a NaN stays one */
+/* From x0 before t0 to x1 after t1; NaN if t is NaN */
 Value Step(Value (*shape)(double, double), double t, double t0, double x0, double t1, double x1)
 {
   const double h = t1 - t0, s = (t - t0) / h;
@@ -56,7 +56,7 @@ Value Step(Value (*shape)(double, double), double t, double t0, double x0, doubl
   return {x0 + p.f, p.f1 / h, p.f2 / (h * h)};
 }
 
-/* The same of a Real. No width, no step: not a number, which the start of the run reports. */
+/* The same for a Real. NaN unless x1 > x0, which is reported at the start of the run. */
 Real Step(Value (*shape)(double, double), const Real &x, double x0, double h0, double x1, double h1)
 {
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -64,7 +64,7 @@ Real Step(Value (*shape)(double, double), const Real &x, double x0, double h0, d
   return chain(x, y.f, y.f1);
 }
 
-/* Whether a step of time can be made, else why not */
+/* Error of a step function's data as text, empty if there is none */
 std::string StepError(double t0, double x0, double t1, double x1)
 {
   if (!Finite({t0, x0, t1, x1})) return "times and values of a step function must be finite";
@@ -122,7 +122,7 @@ TimeFunction::TimeFunction(double constant) : constant_(constant)
   if (!std::isfinite(constant)) error_ = Text("the constant is ", constant, ", must be finite");
 }
 
-/* Whoever evaluates it in spite of the error gets no number. */
+/* A function with an error; its values are NaN. */
 TimeFunction TimeFunction::faulty(const std::string &error)
 {
   TimeFunction g;

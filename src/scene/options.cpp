@@ -1,4 +1,4 @@
-/* Options of the start, read once, and the report on what it has come to. */
+/* Options of the start, read once, and the report of its results. */
 #include "start.h"
 
 namespace hhtdae
@@ -46,7 +46,7 @@ PetscErrorCode ReadStartOptions(SceneData &s)
   PetscFunctionReturn(0);
 }
 
-/* What the scene consists of, and what the start has come to */
+/* Contents of the scene and results of the start */
 PetscErrorCode ViewStart(const SceneData &s, PetscViewer viewer)
 {
   const StartResult              &r = s.started;

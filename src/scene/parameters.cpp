@@ -1,4 +1,4 @@
-/* Parameters of a scene: what depends on them is described anew when they have changed. */
+/* Parameters of a scene: after a change the calls that describe the scene are repeated. */
 #include "journal.h"
 #include <cmath>
 
@@ -23,7 +23,7 @@ Parameter Scene::parameter(const std::string &name, double value)
   const SceneData &s = data();
   if (!journal_) {
     journal_ = std::make_unique<Journal>();
-    if (s.gravity != Vector3::Zero()) record([g = s.gravity](Scene &again) { again.gravity(g); }); /* which may come before */
+    if (s.gravity != Vector3::Zero()) record([g = s.gravity](Scene &again) { again.gravity(g); }); /* gravity may have been set before the first parameter */
     if (!s.ground_acceleration.empty()) record([a = s.ground_acceleration](Scene &again) { again.groundAcceleration(a[0], a[1], a[2]); });
   }
   const auto fault = [&](const char *what) {
@@ -55,7 +55,7 @@ PetscErrorCode Scene::set(const std::string &name, double value)
   PetscFunctionReturn(0);
 }
 
-/* The calls once more, into a model of its own: runs of the old one keep it */
+/* Repeats the recorded calls with a new model; existing runs keep the old one */
 void Scene::describeAnew()
 {
   if (!journal_ || !journal_->stale) return;

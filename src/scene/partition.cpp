@@ -1,4 +1,4 @@
-/* METIS gives every rank its bodies: vertices weighted by their unknowns, edges by the joints and forces between them. */
+/* Distributes bodies to ranks by METIS: vertices are weighted by their unknowns, edges by the joints and forces between them. */
 #include "model.h"
 #include <algorithm>
 #include <metis.h>
@@ -13,14 +13,14 @@ struct Edge {
   PetscInt a, b, weight;
 };
 
-/* Frames of attachments are where their bodies are */
+/* Frames of attachments belong to the owner of their flexible body */
 PetscInt BodyOf(const SceneData &s, PetscInt marker)
 {
   const PetscInt b = s.markers[marker].body;
   return b >= 0 && s.bodies[b].carrier >= 0 ? s.bodies[b].carrier : b;
 }
 
-/* Pairs of bodies that an instance connects, by their vertices; the first with every other one is enough to keep them together */
+/* Pairs of bodies that an instance connects, by their vertices: the first with every other one suffices to keep them together */
 std::vector<Edge> Edges(const SceneData &s, const std::vector<PetscInt> &vertex)
 {
   std::vector<Edge> edges;

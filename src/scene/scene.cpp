@@ -1,4 +1,4 @@
-/* The scene as its user describes it. */
+/* The calls by which a user describes a scene, and its set-up. */
 #include "extension.h"
 #include "guard.h"
 #include "journal.h"
@@ -232,9 +232,9 @@ Element ElementBuilder::done()
   return Element{(PetscInt)data_.elements.size() - 1, data_.number};
 }
 
-/* ---- from description to work ---- */
+/* ---- set-up ---- */
 
-/* What an earlier set-up has found before it failed */
+/* Removes results of an earlier set-up that has failed */
 static void BeginAnew(SceneData &s)
 {
   for (StoreBase *store : s.order)
@@ -244,7 +244,7 @@ static void BeginAnew(SceneData &s)
   s.started = StartResult();
 }
 
-/* Constraints of the user's own are evaluated here, and may throw */
+/* Users' constraints are evaluated here, and may throw */
 PetscErrorCode Scene::setUp()
 {
   PetscFunctionBegin;
@@ -277,7 +277,7 @@ PetscErrorCode Scene::setUp()
     if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
     s.start_given = start_;
     s.markers_then = s.markers.size();
-    s.fixed = M.compiled = true; /* not before everything is done: after an error setUp() starts anew */
+    s.fixed = M.compiled = true; /* only at the end: after an error setUp() begins again */
     PetscFunctionReturn(0);
   }));
   PetscFunctionReturn(0);

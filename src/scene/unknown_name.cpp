@@ -1,4 +1,4 @@
-/* What the integrator's messages call an unknown and its row. */
+/* Names of unknowns and their rows, for messages of the integrator. */
 #include "extension.h"
 #include "model.h"
 #include "start.h"
@@ -20,7 +20,7 @@ std::string NameOfCoordinate(const SceneData &s, const BodyData &b, PetscInt k)
   return k < all ? "rotation " + std::to_string(k - positions + 1) + of : "mode " + std::to_string(k - all + 1) + of;
 }
 
-/* The k-th multiplier of a constraint, of those that are not dropped, or component of a force state; row: of the element's first */
+/* Name of the k-th multiplier of a constraint, dropped ones not counted, or force state; row: number of the part's first row in the element */
 std::string NameOfPart(const SceneData &s, PetscInt element, const Part &p, PetscInt k, int row)
 {
   const ElementData &e = s.elements[element];
@@ -38,7 +38,7 @@ std::string NameOfElement(const SceneData &s, PetscInt row)
   for (std::size_t e = 0; e < s.elements.size(); e++) {
     int before[2] = {0, 0}; /* rows of earlier parts, of forces and constraints */
     for (const Part &p : s.elements[e].parts) {
-      const PetscInt k = p.index < (PetscInt)p.store->start.size() ? row - p.store->start[p.index] : -1; /* what came too late has no unknowns */
+      const PetscInt k = p.index < (PetscInt)p.store->start.size() ? row - p.store->start[p.index] : -1; /* elements added after the set-up have no unknowns */
       int           &n = before[p.store->isConstraint()];
       if (k >= 0 && k < p.store->unknowns(p.index)) return NameOfPart(s, (PetscInt)e, p, k, n);
       n += p.store->rows();
@@ -47,7 +47,7 @@ std::string NameOfElement(const SceneData &s, PetscInt row)
   return "";
 }
 
-/* Theirs are the last ones of every rank */
+/* Unknowns of extensions are the last ones of every rank */
 std::string NameOfExtension(const Model &M, PetscInt row)
 {
   const std::vector<PetscInt> &first = M.number.first;
