@@ -1,4 +1,4 @@
-/* What is orthogonal to given columns, by LAPACK: Eigen's blocked QR takes seconds to compile. */
+/* Orthogonal complement of the columns of a matrix, by LAPACK: Eigen's blocked QR takes seconds to compile. */
 #ifndef HHTDAE_SCENE_COMPLEMENT_H
 #define HHTDAE_SCENE_COMPLEMENT_H
 
@@ -9,7 +9,7 @@
 namespace hhtdae
 {
 
-/* An orthonormal basis, n x (n - m), of what is orthogonal to the m independent columns of A (n x m, m <= n) */
+/* An orthonormal basis, n x (n - m), of the orthogonal complement of the m independent columns of A (n x m, m <= n) */
 inline Eigen::MatrixXd OrthogonalComplement(const Eigen::MatrixXd &A)
 {
   const PetscBLASInt       n = (PetscBLASInt)A.rows(), m = (PetscBLASInt)A.cols(), size = 64 * PetscMax(n, 1);

@@ -79,13 +79,13 @@ inline Vector3 EulerRates(const EulerAxes &e, const Vector3 &w)
   return {along - e.g3(2) * psi, theta, psi};
 }
 
-/* An attitude near this needs other axes: |sin theta| below a half, 30 degrees from the singularity. */
+/* A body gets new axes if |sin theta| is below this: within 30 degrees of the singularity. */
 constexpr double singular_sine = 0.5;
 
 /*
-  Axes for a body of attitude A (body axes as columns) that turns with w: the constant turn C of A = A313(eps) C such that a
-  steady rotation never needs another choice. With the third axis along w theta stays what it is; with it normal to w, and level,
-  theta swings about 90 degrees by the angle between w and the horizontal plane. The better of the two keeps |cos theta| <= 0.71.
+  Axes for a body of attitude A (body axes as columns) with angular velocity w: the constant rotation C of A = A313(eps) C for which a
+  steady rotation never needs other axes. With the third axis along w theta is constant; with the third axis horizontal and normal to w
+  theta oscillates about 90 degrees by the angle between w and the horizontal plane. The better of the two keeps |cos theta| <= 0.71.
 */
 Matrix3 ChooseAxes(const Matrix3 &A, const Vector3 &w);
 

@@ -1,4 +1,4 @@
-/* Users' functions may throw: at the border to PETSc, which is C, it becomes an error. */
+/* Users' functions may throw: exceptions become error codes before they reach PETSc, which is written in C. */
 #ifndef HHTDAE_SCENE_GUARD_H
 #define HHTDAE_SCENE_GUARD_H
 
@@ -19,8 +19,8 @@ template <class Call> PetscErrorCode Guarded(Call call)
   }
 }
 
-/* The error that one rank has met, on all of them, with its text: a function of the user's may fail on the rank alone that owns its body, and the others would
-   wait for that rank for ever. Collective; on one rank it costs nothing. Test: Ranks.test_errors_of_one_rank of test_parallel.py. */
+/* Raises an error of one rank, with its text, on all ranks: a user's function may fail only on the owner of its body, for which the others would
+   wait for ever. Collective; on one rank it costs nothing. Test: Ranks.test_errors_of_one_rank of test_parallel.py. */
 inline PetscErrorCode OnAllRanks(MPI_Comm comm, PetscErrorCode code)
 {
   PetscMPIInt size, rank, mine, first;

@@ -1,4 +1,4 @@
-/* What was described, call by call, so that it can be described again with other parameters. */
+/* The recorded calls that describe a scene, so that they can be repeated with other parameters. */
 #ifndef HHTDAE_SCENE_JOURNAL_H
 #define HHTDAE_SCENE_JOURNAL_H
 
@@ -14,7 +14,7 @@ struct Scene::Journal {
   std::vector<std::size_t>                  before; /* markers and bodies, attachments among them, at first before each call */
   std::map<std::string, Parameter>          parameters;
   std::vector<std::string>                  errors; /* of parameters themselves */
-  bool                                      stale = false; /* a parameter has changed since the calls were made */
+  bool                                      stale = false; /* a parameter has changed since the present model was described */
 };
 
 } // namespace hhtdae

@@ -1,6 +1,6 @@
 /*
-  The invariants quadratic in the modes, N_cd = int phi_c phi_d^T, packed for what the equations of motion need of them:
-  products with coordinates and rates, and sums with factors that change.
+  The invariants quadratic in the modes, N_cd = int phi_c phi_d^T, packed for the operations in the equations of motion:
+  products with coordinates and rates, and linear combinations with varying factors.
 
   N_dc is the transpose of N_cd. In terms of symmetric and skew parts, N_cd = S + K and N_dc = S - K, half of each matrix
   says all, and of S_zz nothing is left where the three diagonal ones add up to the identity, as they do for orthonormal
@@ -29,7 +29,7 @@ public:
   /* quadratic: xx, yy, zz, xy, yz, zx; null: there are none, and only outer products can be asked for */
   ModalProducts(int modes, const std::array<Eigen::MatrixXd, 6> *quadratic);
 
-  /* What is made of a vector x: adds S x for xx, yy, zz, xy, yz, zx to `symmetric`, unless it is null, and K x for
+  /* Products with a vector x: adds S x for xx, yy, zz, xy, yz, zx to `symmetric`, unless it is null, and K x for
      xy, yz, zx to `skew`, both of leading dimension padded(), zero at first */
   struct Task {
     const double *x;

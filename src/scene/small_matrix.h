@@ -1,7 +1,7 @@
 /*
-  Sums, multiples and products of Eigen's matrices of at most 36 entries, their number known when compiled, as values in place of
-  expressions: operators that are found within this namespace in place of Eigen's. Eigen has a type for every expression, and these took
-  a quarter of the time to compile the libraries; for three rows and columns there is nothing to be gained from putting off the sums.
+  Sums, multiples and products of Eigen's matrices of fixed size with at most 36 entries, as values instead of
+  expressions: within this namespace these operators are found before Eigen's. Eigen has a type for every expression, and these took
+  a quarter of the time to compile the libraries; for such small matrices lazy evaluation has no advantage.
 */
 #ifndef HHTDAE_SCENE_SMALL_MATRIX_H
 #define HHTDAE_SCENE_SMALL_MATRIX_H
@@ -15,7 +15,7 @@ namespace hhtdae
 namespace small
 {
 
-/* Whether the operators take it, and the matrix that has its values */
+/* Whether the operators apply to a size, and the type of the matrix with the values */
 template <class S, int R, int C> struct Size {
   static constexpr int  rows    = R;
   static constexpr int  columns = C;

@@ -42,7 +42,7 @@ template <class T> struct Line {
   }
 };
 
-/* What all forces along a line share */
+/* Common part of all forces along a line */
 template <class K> struct LineForce : Force<K, 2, 1> {
   static constexpr unsigned depends = Position(0) | Position(1), acts = depends;
   static constexpr bool     needs_rotation = false;

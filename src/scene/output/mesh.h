@@ -1,4 +1,4 @@
-/* What the animation shows: a mesh whose points are fixed to bodies. The same on every rank; only the first one uses it. */
+/* The mesh of an animation, whose points are fixed to bodies. The same on every rank; only the first one uses it. */
 #ifndef HHTDAE_SCENE_OUTPUT_MESH_H
 #define HHTDAE_SCENE_OUTPUT_MESH_H
 

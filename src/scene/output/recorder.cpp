@@ -155,7 +155,7 @@ PetscErrorCode MakeTasks(Recorder &r, const OutputSettings &o)
   PetscFunctionReturn(0);
 }
 
-/* What the other types of TS have: values at the ends of steps */
+/* For TS types other than TSHHT3: samples at the ends of steps, without accelerations */
 PetscErrorCode FallBack(Recorder &r, TS ts)
 {
   TSType type;
@@ -169,7 +169,7 @@ PetscErrorCode FallBack(Recorder &r, TS ts)
 
 } // namespace
 
-/* Times between samples that a double cannot tell from one another would never pass */
+/* An error if the time between samples is below the rounding of the times: sample times would not increase */
 static PetscErrorCode CheckDistances(const Recorder &r, TS ts)
 {
   PetscReal t, end;
