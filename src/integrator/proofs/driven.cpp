@@ -21,6 +21,7 @@ namespace hht3
 namespace
 {
 
+constexpr PetscReal least_tolerance = 1e-4; /* of the corrector's: at fixed steps the error of the last step takes the tolerance's place, down to here, as forces have rounding (StiffStart.StrongDampingStopsAtOnce) */
 constexpr PetscReal driven_response = 1e-9; /* of what inertia alone would answer to a force: less is rounding of the solve */
 
 /* The residual in the rows of driven coordinates, in units of the tolerance, above what is known of its rounding */
@@ -123,7 +124,7 @@ PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBoo
 {
   Integrator     &I      = Get(ts);
   Corrector      &c      = I.corrector;
-  const PetscReal before = c.forces, tol = PetscMax(tolerance, least_step_error * CorrectorTolerance(I));
+  const PetscReal before = c.forces, tol = PetscMax(tolerance, least_tolerance * CorrectorTolerance(I));
 
   PetscFunctionBegin;
   *good = (PetscBool)(!I.verify.driven || (!*evaluated && before <= tol));

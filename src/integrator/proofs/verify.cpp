@@ -205,9 +205,8 @@ PetscErrorCode VerifyCorrection(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluate
   *proved  = PETSC_TRUE;
   v.looked = PETSC_FALSE;
   if (!MayHideForces(I)) PetscFunctionReturn(PETSC_SUCCESS);
-  const PetscReal limit = allowed_unproved * (I.fixed_h ? PetscClipInterval(c.wlte, least_step_error, 1) : 1);
   PetscCall(StiffnessClaimed(ts, dX, &claimed));
-  if (claimed <= limit) {
+  if (claimed <= allowed_unproved) {
     v.since += I.h;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -215,14 +214,14 @@ PetscErrorCode VerifyCorrection(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluate
   *evaluated = v.looked = PETSC_TRUE;
   if (!HasDefinitions(I)) PetscCall(ModelResidual(ts, dX));
   for (int attempt = 0; attempt < 2; attempt++) {
-    if (attempt) PetscCall(CompareAboveRounding(ts, X, F, limit, &left));
+    if (attempt) PetscCall(CompareAboveRounding(ts, X, F, allowed_unproved, &left));
     else PetscCall(CompareWithModel(ts, F, &left));
     /* a rate measured in this correction speaks for what is left, unless that is as it was */
     const bool good = c.it - c.base >= 2 && c.matrix.rate >= 0 && c.matrix.rate < 0.5 && left.part < 0.5;
-    *proved         = (PetscBool)((good || left.all <= limit) && left.stay <= limit);
+    *proved         = (PetscBool)((good || left.all <= allowed_unproved) && left.stay <= allowed_unproved);
     if (attempt && !*proved) {
       PetscCall(StiffnessClaimed(ts, dX, &claimed));
-      *proved = (PetscBool)(!MayHideForces(I) || claimed <= limit);
+      *proved = (PetscBool)(!MayHideForces(I) || claimed <= allowed_unproved);
     }
     if (*proved) {
       PetscCall(NoteProof(ts, F));

@@ -10,8 +10,6 @@ namespace hht3
 
 constexpr PetscReal unanswered_fraction = 0.1; /* of what a residual was: at 0.3 friction that slips within a step passed for followed */
 
-constexpr PetscReal least_step_error = 1e-4; /* at fixed steps the error of the last step takes the tolerance's place, down to here: forces have rounding, StiffStart.StrongDampingStopsAtOnce */
-
 /* d s'/d w, which a row of a state has in place of ca */
 inline PetscReal StateInertia(const Parameters &p) { return p.gamma_s * p.gamma / p.beta; }
 
