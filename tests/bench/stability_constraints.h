@@ -150,14 +150,14 @@ inline void AddRedundant(Cases &cases)
   for (double d : {1e-14, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2}) {
     Add(cases, "redundant", Name("three cranks, one %.0e longer", d), "moves or locked, or error", 2e-3, [d](Run &r) {
       return ThreeCranks(r, d, false);
-    }).orFail("No consistent accelerations");
+    }).orFail("redundant at the start");
     Add(cases, "redundant", Name("three cranks, one %.0e askew", d), "moves or locked, or error", 2e-3, [d](Run &r) {
       return ThreeCranks(r, d, true);
-    }).orFail("No consistent accelerations");
+    }).orFail("redundant at the start");
   }
   for (double d : {0., 1e-14, 1e-12, 1e-9, 1e-6, 1e-3})
     Add(cases, "redundant", d == 0 ? "door on two hinges" : Name("door, hinges %.0e rad apart", d),
-        "position: moves or locked", 2e-3, [d](Run &r) { return Door(r, d, Redundant::Drop); });
+        "moves or locked, or error", 2e-3, [d](Run &r) { return Door(r, d, Redundant::Drop); }).orFail("redundant at the start");
   Add(cases, "redundant", "door, refused", "names the element", 2e-3,
       [](Run &r) { return Door(r, 0, Redundant::Refuse); })
       .mustFail("upper hinge")
