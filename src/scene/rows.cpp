@@ -141,6 +141,7 @@ double MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks)
   std::vector<PetscInt>           root(s.bodies.size());
   std::vector<Eigen::AlignedBox3d> box(s.bodies.size());
   double                          size = 0, far = 0;
+  bool                            deformable = false; /* reaches farther than its frame */
   const auto                      rootOf = [&](PetscInt b) {
     while (root[b] != b) b = root[b] = root[root[b]];
     return b;
@@ -151,7 +152,10 @@ double MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks)
   for (const RowBlock &b : blocks) {
     if (b.body.empty()) continue;
     Eigen::AlignedBox3d &all = box[rootOf(b.body[0])];
-    for (PetscInt k : b.body) all.extend(s.bodies[k].r);
+    for (PetscInt k : b.body) {
+      all.extend(s.bodies[k].r);
+      deformable |= s.bodies[k].flexible || s.bodies[k].massless;
+    }
     for (int k = 0; k < b.store->markers(); k++) all.extend(s.frame(Marker{b.store->marker(b.instance, k)}).x);
   }
   for (const Eigen::AlignedBox3d &b : box) {
@@ -159,7 +163,8 @@ double MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks)
     size = std::max(size, b.diagonal().norm());
     far  = std::max({far, b.min().norm(), b.max().norm()});
   }
-  return size > 0 ? std::max(size, 1e-5 * far) : SceneSize(s);
+  const double scene = SceneSize(s);
+  return deformable || size < 1e-6 * scene ? scene : std::max(size, 1e-5 * far); /* a body that is held at its origin has no size here */
 }
 
 std::string RowName(const SceneData &s, PetscInt element, int row, const char *kernel)

@@ -129,12 +129,10 @@ PetscErrorCode FindExcitation(TS ts)
    golden section, nowhere further apart than coasting of the run: of one that goes on, as many as what is new takes of it (BetweenRuns.SolvedInParts) */
 PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
 {
-  constexpr int   most_samples  = 89;
-  Integrator     &I       = Get(ts);
-  const PetscReal from          = I.ahead == Ahead::Nothing ? PetscMax(t, I.ahead_to) : t;
-  const PetscReal rest          = ts->max_time - from;
-  const PetscReal run           = ts->max_time - (from > t ? I.t_begin : t);
-  const int       samples_ahead = (int)PetscMin(PetscCeilReal(most_samples * rest / run), most_samples);
+  constexpr int   most_samples = 89;
+  Integrator     &I    = Get(ts);
+  const PetscReal from = I.ahead == Ahead::Nothing ? PetscMax(t, I.ahead_to) : t;
+  const PetscReal rest = ts->max_time - from, run = ts->max_time - (from > t ? I.t_begin : t);
   PetscReal       part = 0, change = 0;
   WorkVec         zero, now, then;
 
@@ -142,6 +140,7 @@ PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
   I.ahead    = Ahead::Nothing;
   I.ahead_to = ts->max_time;
   if (!(ts->max_time < PETSC_MAX_REAL / 2 && rest > 0)) PetscFunctionReturn(PETSC_SUCCESS); /* a run without end (Excitation.RunsWithoutEnd) */
+  const int samples_ahead = (int)PetscMin(PetscCeilReal(most_samples * (rest / run)), most_samples);
   for (WorkVec *v : {&zero, &now, &then}) PetscCall(v->like(U));
   PetscCall(VecZeroEntries(zero));
   PetscCall(EvaluateResidual(ts, t, U, V, zero, now));

@@ -92,8 +92,8 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
   *tiny = PETSC_FALSE;
   if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > tiny_ratio * I.h_regular && h > 10 * I.h_rounded)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RoundingOfAccelerations(ts, h, &part));
-  I.h_rounded = h * PetscSqrtReal(part / rounded_accelerations);
   if (part <= rounded_accelerations) PetscFunctionReturn(PETSC_SUCCESS);
+  I.h_rounded = h * PetscSqrtReal(part / rounded_accelerations); /* at rest nothing says what longer steps will find: SceneReferences.QuarterCar */
   PetscCall(TaylorError(ts, h, &missed));
   *tiny = (PetscBool)(missed <= CorrectorTolerance(I));
   PetscFunctionReturn(PETSC_SUCCESS);
