@@ -10,6 +10,7 @@
 #include "integrator/entries.h"
 #include "integrator/equations/equations.h"
 #include "integrator/equations/rows.h"
+#include "integrator/step/estimate.h"
 #include "integrator/type/settings.h"
 #include "integrator/equations/solver.h"
 #include "start.h"
