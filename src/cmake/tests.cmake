@@ -128,7 +128,7 @@ endif()
 
 # A slice of the random models of "make soak", small ones of another seed
 if(TARGET models)
-  add_test(NAME soak.models COMMAND models -small -seed 2 -count 32 -jobs 1 -output none)
+  add_test(NAME soak.models COMMAND models -small -seed 2 -count 20 -jobs 1 -output none)
   set_tests_properties(soak.models PROPERTIES ENVIRONMENT "${serial_environment}" TIMEOUT 900 LABELS soak)
 endif()
 
