@@ -217,7 +217,7 @@ struct StepState {
   PetscReal        of_atol = -1, of_rtol = -1; /* tolerances that the weights were made of */
   PetscReal        wlte_pending = -1; /* estimate of the step at hand, -1 if nobody has asked */
   PetscReal        h_regular   = 0;   /* running maximum of steps that went through the corrector, forgetting a tenth in each */
-  PetscReal        h_rounded   = 0;   /* below which rounding would be too large a part of the accelerations, when it was looked at last */
+  PetscReal        h_rounded   = 0;   /* below which rounding is too large a part of the accelerations, as the last tiny step has found; 0: none has */
   PetscReal        h_limit     = 0;   /* what h may grow to after a failed correction; 0: no limit */
   PetscInt         tiny_row    = 0;   /* tiny steps in a row to which failures have led */
   PetscBool        auto_h      = PETSC_FALSE; /* the first step is still to be chosen */

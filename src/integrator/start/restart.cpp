@@ -93,7 +93,7 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
   if (!I.count[TSHHT3_HOLONOMIC] || (I.h_regular > 0 && h > tiny_ratio * I.h_regular && h > 10 * I.h_rounded)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RoundingOfAccelerations(ts, h, &part));
   if (part <= rounded_accelerations) PetscFunctionReturn(PETSC_SUCCESS);
-  I.h_rounded = h * PetscSqrtReal(part / rounded_accelerations); /* at rest nothing says what longer steps will find: SceneReferences.QuarterCar */
+  I.h_rounded = h * PetscSqrtReal(part / rounded_accelerations); /* only where a step was drowned: at rest, longer ones would pass for tiny and skip loads that set in (SceneReferences.QuarterCar) */
   PetscCall(TaylorError(ts, h, &missed));
   *tiny = (PetscBool)(missed <= CorrectorTolerance(I));
   PetscFunctionReturn(PETSC_SUCCESS);
