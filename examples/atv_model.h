@@ -16,7 +16,6 @@
 #include "atv_frame.h"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <hhtdae/scene.h>
 #include <memory>
 

@@ -192,19 +192,26 @@ static double ValueInGap(const VectorXd &lambda, PetscInt *below)
   return lambda[*below - 1] * (1 + 1e-5);
 }
 
-/* Number of modes missing below the highest gap, by inertia: Krylov methods may miss copies of multiple eigenvalues, as symmetric bodies have them */
-static PetscErrorCode CountMissing(const Pencil &pencil, const NormalModes &modes, PetscInt *missing)
+constexpr char none_missing[] = "none is missing";
+
+/* Number of modes missing below the highest gap, by inertia: Krylov methods may miss copies of multiple eigenvalues, as symmetric bodies have them.
+   0 where they are not counted, by option or because the solver does not tell the inertia; modes->count says so. */
+static PetscErrorCode CountMissing(const Pencil &pencil, NormalModes *modes, PetscInt *missing)
 {
   PetscBool verify = PETSC_TRUE;
   PetscInt  below, count;
 
   PetscFunctionBegin;
-  *missing = 0;
+  *missing     = 0;
+  modes->count = "not counted";
   PetscCall(PetscOptionsGetBool(nullptr, REDUCE_PREFIX, "-verify", &verify, nullptr));
-  if (!verify || !modes.lambda.size()) PetscFunctionReturn(0);
-  const double sigma = ValueInGap(modes.lambda, &below);
+  if (!verify || !modes->lambda.size()) PetscFunctionReturn(0);
+  const double sigma = ValueInGap(modes->lambda, &below);
   PetscCall(CountBelow(pencil, sigma, &count));
-  if (count >= 0) *missing = count - below;
+  if (count >= 0) {
+    *missing     = count - below;
+    modes->count = none_missing;
+  }
   PetscCall(PetscInfo(pencil.K, "%" PetscInt_FMT " modes below %g by inertia, %" PetscInt_FMT " found\n", count, sigma,
                       below));
   PetscFunctionReturn(0);
@@ -261,10 +268,13 @@ PetscErrorCode FindModes(const Pencil &pencil, const WantedModes &wanted, const 
   if (slices) PetscCall(KSPDestroy(ksp)); /* spectrum slicing has its own solvers and counts by inertia itself */
   const PetscInt ask = slices ? count : std::min(count + extra_modes, most);
   PetscCall(RunEps(pencil, wanted, ask, slices, ksp, modes));
-  if (slices) PetscCall(FactorAgain(pencil, wanted.shift, ksp));
+  if (slices) {
+    PetscCall(FactorAgain(pencil, wanted.shift, ksp));
+    modes->count = none_missing;
+  }
   PetscCall(Use(use, count, ksp, modes));
   for (int search = 0; !slices; search++) {
-    PetscCall(CountMissing(pencil, *modes, &missing));
+    PetscCall(CountMissing(pencil, modes, &missing));
     if (missing <= 0 || search == max_searches) break;
     PetscCall(RunEps(pencil, wanted, std::min(missing, most - (PetscInt)modes->lambda.size()), slices, ksp, modes));
     PetscCall(Use(use, count, ksp, modes));

@@ -93,6 +93,7 @@ struct NormalModes {
   VectorXd    lambda; /* ascending */
   MatrixXd    x;      /* own rows, M-orthonormal */
   std::string how;    /* iterations, for the progress messages */
+  std::string count = "none to count"; /* what the count by inertia found, for the progress messages */
 };
 
 struct WantedModes {
