@@ -186,7 +186,7 @@ inline void AddReleases(Cases &cases)
               "height, exact", step.accept + soft,
               [=](Run &r) { return ReleaseCase(r, Release(hold.hold, s, company, as_force), step.eps, step.h); });
           if (hold.hold == Hold::Brake && s > 1e11) c.orFail("No "); /* 1e9 N held by a sliding of 1e-11 m/s: rounding may end it, with a word */
-          if (d == 8 && step.h < 0) c.test();
+          if (d == 8 && step.h <= 0) c.test();
         }
 }
 

@@ -17,6 +17,7 @@ constexpr PetscReal grown_rounding = 1e-6; /* part of the accelerations that gro
 
 constexpr PetscReal tiny_ratio            = 1e-4; /* of the longest step of late: the common case, decided without a reduction */
 constexpr PetscReal rounded_accelerations = 0.01; /* part of the accelerations that may be rounding in a step that goes through the corrector */
+constexpr PetscReal rounded_loads         = 1e-10; /* of the loads: accelerations below are what rounding leaves where these are balanced (releases of the table of stability) */
 
 /*
   When h has to shrink by much. A step of length h satisfies Phi_q q' + Phi_t = 0 to O(h^2) only; a far shorter one that
@@ -44,32 +45,59 @@ PetscErrorCode RestartConsistently(TS ts)
 /* Whether the step to come is far shorter than those of late, by which the corrector has measured what it leaves of the constraints */
 PetscBool IsFarShorter(const Integrator &I, PetscReal h) { return (PetscBool)(h < restart_ratio * I.h_regular); }
 
-/* What rounding of Phi makes of accelerations in a step of length h, eps |q|/(beta h^2), in parts of the accelerations that there are */
-static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *part)
+/* Whether the accelerations are more than rounding of the loads, which are taken without velocities and forces of constraints: those of a body that a damper lets sink slowly are not */
+static PetscErrorCode AreAccelerated(TS ts, PetscBool *yes)
 {
-  const Integrator &I = Get(ts);
-  PetscReal         T, e;
+  const Integrator &I      = Get(ts);
+  PetscReal         sum[2] = {0, 0}; /* squares of loads, and of what the accelerations add */
+  WorkVec           U, zero, load, F;
 
   PetscFunctionBegin;
-  PetscCall(CorrectionNorm(ts, I.A0, 1, &e));
-  PetscCall(TimeScaleOfConstraints(ts, &T));
-  const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / (T * T));
-  *part               = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h) / a;
+  for (WorkVec *v : {&U, &zero, &load, &F}) PetscCall(v->like(I.U0));
+  PetscCall(VecZeroEntries(zero));
+  PetscCall(VecCopy(I.U0, U));
+  PetscCall(ForEntries([&](PetscInt i, PetscScalar &u) { if (IsConstraint(I, i)) u = 0; }, Write(U)));
+  PetscCall(EvaluateResidual(ts, ts->ptime, U, zero, zero, load));
+  PetscCall(EvaluateResidual(ts, ts->ptime, U, zero, I.A0, F));
+  PetscCall(ForEntries(
+    [&](PetscInt i, PetscScalar f, PetscScalar all) {
+      if (!IsCoordinate(I, i)) return;
+      sum[0] += PetscRealPart(f * f);
+      sum[1] += PetscRealPart((all - f) * (all - f));
+    },
+    Read(load), Read(F)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  *yes = (PetscBool)(PetscSqrtReal(sum[1]) > rounded_loads * PetscSqrtReal(sum[0])); /* not where these are no numbers */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What Taylor's series leaves out of coordinates, h^3/6 q''', and of states, h^2/2 s'', in units of the tolerance; 0 where no rates are known */
-static PetscErrorCode TaylorError(TS ts, PetscReal h, PetscReal *e)
+/* What rounding of Phi makes of accelerations in a step of length h, eps |q|/(beta h^2), in parts of the accelerations that there are, and of those that change
+   q by its tolerance in the time that the motion takes; where there are none, within the run. In a run of a millionth of that time these are far larger
+   (BetweenRuns.ShortRunsHaveTheirMultipliers). */
+static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *part)
 {
   const Integrator &I     = Get(ts);
-  PetscReal         sum = 0;
-  WorkVec           slope;
+  PetscBool         there = PETSC_TRUE;
+  PetscReal         run, motion, e;
 
   PetscFunctionBegin;
-  *e = 0;
-  if (I.predictor.available < 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(slope.like(I.X));
-  PetscCall(SlopeOfUnknowns(I, slope));
+  PetscCall(CorrectionNorm(ts, I.A0, 1, &e));
+  PetscCall(TimeScale(ts, &run));
+  PetscCall(TimeScaleOfConstraints(ts, &motion));
+  const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), rounding = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h);
+  const PetscReal least = eps / PetscSqr(run), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / PetscSqr(motion));
+  if (a < least && rounding > rounded_accelerations * a) PetscCall(AreAccelerated(ts, &there)); /* else it makes no difference */
+  *part = rounding / (there ? a : PetscMax(a, least));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What Taylor's series leaves out of coordinates, h^3/6 q''', and of states, h^2/2 s'', in units of the tolerance, by the slope of the unknowns */
+static PetscErrorCode TaylorError(TS ts, PetscReal h, Vec slope, PetscReal *e)
+{
+  const Integrator &I   = Get(ts);
+  PetscReal         sum = 0;
+
+  PetscFunctionBegin;
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar rate, PetscScalar w) { sum += PetscSqr(PetscRealPart(rate * w) * (IsCoordinate(I, i) ? h * h * h / 6 : h * h / 2)); },
     Read(slope), Read(I.weight)));
@@ -86,7 +114,8 @@ static PetscErrorCode TaylorError(TS ts, PetscReal h, PetscReal *e)
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
 {
   Integrator &I = Get(ts);
-  PetscReal   part, missed;
+  PetscReal   part, missed = 0;
+  WorkVec     slope;
 
   PetscFunctionBegin;
   *tiny = PETSC_FALSE;
@@ -94,7 +123,11 @@ PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny)
   PetscCall(RoundingOfAccelerations(ts, h, &part));
   if (part <= rounded_accelerations) PetscFunctionReturn(PETSC_SUCCESS);
   I.h_rounded = h * PetscSqrtReal(part / rounded_accelerations); /* only where a step was drowned: at rest, longer ones would pass for tiny and skip loads that set in (SceneReferences.QuarterCar) */
-  PetscCall(TaylorError(ts, h, &missed));
+  if (I.predictor.available) {
+    PetscCall(slope.like(I.X));
+    PetscCall(SlopeOfUnknowns(I, slope));
+    PetscCall(TaylorError(ts, h, slope, &missed));
+  }
   *tiny = (PetscBool)(missed <= CorrectorTolerance(I));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -117,16 +150,17 @@ PetscErrorCode NeedsRestart(TS ts, PetscReal h, PetscBool *yes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From U0, V0, A0 over h: leaves U1, V1, A1 and X as a corrected step would */
-PetscErrorCode TinyStep(TS ts, PetscBool *ok)
+/* From U0, V0, A0 over h: leaves U1, V1, A1 and X as a corrected step would. Where these tell that the series has missed more than the corrector leaves, as where
+   a load has set in, or what held has let go (the damper's releases in the table of stability), the step is not tiny after all. */
+PetscErrorCode TinyStep(TS ts, PetscBool *tiny, PetscBool *ok)
 {
   Integrator &I = Get(ts);
+  PetscReal   missed;
   Prepared    have;
   WorkVec     U, V;
 
   PetscFunctionBegin;
   PetscCall(PetscInfo(ts, "step of %g is below what rounding of q allows the corrector: Taylor series\n", (double)I.h));
-  I.stat.tiny_steps++;
   PetscCall(U.like(I.U0));
   PetscCall(V.like(I.U0));
   PetscCall(Advance(I, I.h, U, V));
@@ -137,6 +171,14 @@ PetscErrorCode TinyStep(TS ts, PetscBool *ok)
     PetscCall(EvaluateResidual(ts, I.t1, I.U1, I.V1, I.A1, U));
     PetscCall(CheckNumbers(ts, I.t1, {U, I.U1, I.V1, I.A1}, ok));
   }
+  if (*ok) {
+    PetscCall(VecWAXPY(U, -1, I.predictor.X[0], I.X));
+    PetscCall(VecScale(U, 1 / I.h));
+    PetscCall(TaylorError(ts, I.h, U, &missed));
+    *tiny = (PetscBool)(missed <= CorrectorTolerance(I));
+    if (!*tiny) PetscCall(PetscInfo(ts, "the series has missed %g times what the corrector leaves: a step of the corrector\n", (double)(missed / CorrectorTolerance(I))));
+  }
+  if (*tiny) I.stat.tiny_steps++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

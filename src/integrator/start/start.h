@@ -36,7 +36,7 @@ PetscBool      IsFarShorter(const Integrator &I, PetscReal h);
 /* Whether a step of length h is so short that rounding would drown its accelerations; such a step by Taylor series: U1, V1, A1 and X as a corrected one would
    leave them */
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny);
-PetscErrorCode TinyStep(TS ts, PetscBool *ok);
+PetscErrorCode TinyStep(TS ts, PetscBool *tiny, PetscBool *ok);
 
 /* The matrix of the start, [M Phi_q^T; Phi_q 0] at U, V, factored */
 PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);

@@ -29,7 +29,8 @@ namespace hht3
 namespace
 {
 
-/* Of the running maximum of h, from step to step; of the limit of h after a failed correction; and of h, from where on that limit is far away and forgotten */
+/* Of the running maximum of h, from step to step; of the limit of h after a failed correction; and of h, from where on that limit is far away and forgotten (without, creep at
+   v_s = 1e-6 and a release of friction at 1e10 in the table of stability miss) */
 constexpr PetscReal regular_decay = 0.9, limit_growth = 1.02, limit_forgotten = 4;
 
 /* (1e-28 times as much)^2 is a number, too, see vanishing_step (FrontDoor.RunsOfNoLength) */
@@ -182,6 +183,20 @@ void NoteGivenStep(TS ts)
   if (ts->time_step != I.h_next && PetscAbsReal(ts->time_step - rest) > 1e-10 * rest) I.h_given = ts->time_step;
 }
 
+/* From t_n over the step size of the TS */
+PetscErrorCode BeginStage(TS ts)
+{
+  Integrator &I = Get(ts);
+
+  PetscFunctionBegin;
+  I.h  = ts->time_step;
+  I.t0 = ts->ptime;
+  I.t1 = ts->ptime + I.h;
+  if (I.t1 > I.t0 && PetscAbsReal(I.t1 - I.t0 - I.h) > 1e-9 * I.h) I.h = SpanFrom(I.t0, I.h);
+  PetscCall(TSPreStage(ts, I.t1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode AttemptStep(TS ts, PetscBool *tiny, PetscBool *ok)
 {
   Integrator &I = Get(ts);
@@ -191,16 +206,15 @@ PetscErrorCode AttemptStep(TS ts, PetscBool *tiny, PetscBool *ok)
   PetscCall(ForgetForeignMatrix(ts));
   PetscCall(ApplyStepLimit(ts));
   PetscCall(IsTinyStep(ts, ts->time_step, tiny));
-  if (!*tiny) PetscCall(NeedsRestart(ts, ts->time_step, &restart));
-  if (restart) PetscCall(RestartConsistently(ts));
-  if (!*tiny && I.change.stale) PetscCall(StepAfterChange(ts));
-  I.h  = ts->time_step;
-  I.t0 = ts->ptime;
-  I.t1 = ts->ptime + I.h;
-  if (I.t1 > I.t0 && PetscAbsReal(I.t1 - I.t0 - I.h) > 1e-9 * I.h) I.h = SpanFrom(I.t0, I.h);
-  PetscCall(TSPreStage(ts, I.t1));
-  if (*tiny) PetscCall(TinyStep(ts, ok));
-  else {
+  if (*tiny) {
+    PetscCall(BeginStage(ts));
+    PetscCall(TinyStep(ts, tiny, ok));
+  }
+  if (!*tiny) {
+    PetscCall(NeedsRestart(ts, ts->time_step, &restart));
+    if (restart) PetscCall(RestartConsistently(ts));
+    if (I.change.stale) PetscCall(StepAfterChange(ts));
+    PetscCall(BeginStage(ts));
     PetscCall(UseOrder(ts));
     if (I.change.stale) PetscCall(MatrixAfterChange(ts));
     PetscCall(AdaptVelocities(ts));
