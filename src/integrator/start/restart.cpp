@@ -150,8 +150,8 @@ PetscErrorCode NeedsRestart(TS ts, PetscReal h, PetscBool *yes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From U0, V0, A0 over h: leaves U1, V1, A1 and X as a corrected step would. Where these tell that the series has missed more than the corrector leaves, as where
-   a load has set in, or what held has let go (the damper's releases in the table of stability), the step is not tiny after all. */
+/* From U0, V0, A0 over h: leaves U1, V1, A1 and X as a corrected step would. Where these tell that the series has missed more than the corrector leaves, as a load that has
+   set in, the step is not tiny after all (Excitation.WhereAccelerationsAreNextToNothing). */
 PetscErrorCode TinyStep(TS ts, PetscBool *tiny, PetscBool *ok)
 {
   Integrator &I = Get(ts);
