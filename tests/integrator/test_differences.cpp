@@ -2,6 +2,9 @@
 #include "support.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <petscdmda.h>
+#include <unistd.h>
 
 using namespace hhtest;
 
@@ -331,4 +334,91 @@ TEST(Differences, LargePositions)
     EXPECT_NEAR((double)other.first, (double)one.first, 0.1 * (double)one.first) << scale;
     EXPECT_NEAR(other.second, one.second, 1e-4) << scale;
   }
+}
+
+namespace
+{
+
+/* A pendulum whose functions and matrix are those of a DM; with `places` its matrix has all of them, else the diagonal */
+class PendulumOfADM
+{
+public:
+  PendulumOfADM(bool places, bool jacobian, const std::string &options) : options_(options)
+  {
+    TSI2Function f;
+    TSI2Jacobian j;
+    void        *of_f, *of_j;
+    DM           dm;
+    must(ProblemCreateTS(PETSC_COMM_SELF, pendulum_, &source_, &U, &V));
+    must(TSGetI2Function(source_, nullptr, &f, &of_f));
+    must(TSGetI2Jacobian(source_, nullptr, nullptr, &j, &of_j));
+    must(DMDACreate1d(PETSC_COMM_SELF, DM_BOUNDARY_NONE, 3, 1, places ? 2 : 0, nullptr, &dm));
+    must(DMSetUp(dm));
+    must(DMTSSetI2Function(dm, f, of_f));
+    if (jacobian) must(DMTSSetI2Jacobian(dm, j, of_j));
+    must(TSCreate(PETSC_COMM_SELF, &ts));
+    must(TSSetType(ts, TSHHT3));
+    must(TSSetDM(ts, dm));
+    must(DMDestroy(&dm));
+    must(TS2SetSolution(ts, U, V));
+    must(TSSetMaxTime(ts, pendulum_.t1));
+    must(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_MATCHSTEP));
+    Options in(options_);
+    must(TSSetFromOptions(ts));
+  }
+  ~PendulumOfADM()
+  {
+    TSDestroy(&ts);
+    TSDestroy(&source_);
+    VecDestroy(&U);
+    VecDestroy(&V);
+  }
+  PetscErrorCode solve()
+  {
+    Options in(options_);
+    return TSSolve(ts, nullptr);
+  }
+  TSHHT3Statistics statistics() const
+  {
+    TSHHT3Statistics s;
+    must(TSHHT3GetStatistics(ts, &s));
+    return s;
+  }
+  TS  ts = nullptr;
+  Vec U = nullptr, V = nullptr;
+
+private:
+  const Pendulum    pendulum_{-90., 0., 2.};
+  const std::string options_;
+  TS                source_ = nullptr;
+};
+
+} // namespace
+
+/* A matrix of the DM that has no place for derivatives of constraints: -snes_fd finds all places, with a Jacobian of the application's and without */
+TEST(Differences, AllPlacesOfADM)
+{
+  PendulumOfADM given(true, true, tolerance(1e-5)), lacks(false, false, tolerance(1e-5)), found(false, false, tolerance(1e-5) + "-snes_fd");
+  must(given.solve());
+  {
+    ErrorTrap trap;
+    EXPECT_TRUE(lacks.solve() || !lacks.statistics().steps) << "differences without places for constraints went through";
+  }
+  must(found.solve());
+  EXPECT_LT(relativeDifference(whole(found.U), whole(given.U)), 1e-6);
+}
+
+/* A run that goes on from a checkpoint calls the Jacobian of the DM, as the whole one has */
+TEST(Checkpoint, JacobianOfADM)
+{
+  const std::string file = testing::TempDir() + "hhtdae-jacobian-of-a-dm-" + std::to_string((long)getpid()), reuse = tolerance(1e-5) + "-ts_hhtdae_reuse 1,0,1 ";
+  PendulumOfADM     all(true, true, reuse), first(true, true, reuse + "-ts_max_steps 20 -ts_hhtdae_checkpoint " + file), rest(true, true, reuse + "-ts_hhtdae_resume " + file);
+  must(all.solve());
+  must(first.solve());
+  must(rest.solve());
+  for (const char *part : {"", ".info"}) std::remove((file + part).c_str());
+  EXPECT_EQ(whole(rest.U), whole(all.U));
+  EXPECT_EQ(whole(rest.V), whole(all.V));
+  EXPECT_EQ(rest.statistics().residuals, all.statistics().residuals);
+  EXPECT_EQ(rest.statistics().jacobians, all.statistics().jacobians);
 }

@@ -146,6 +146,22 @@ PetscErrorCode SaveNewton(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* TSSetUp() lets the SNES call the Jacobian of the TS when its type is set up; without, SNESSetUp() takes differences of its own function (Checkpoint.JacobianOfADM) */
+PetscErrorCode SetUpSNES(TS ts)
+{
+  DM     dm;
+  DMSNES sdm;
+  DMTS   tdm;
+
+  PetscFunctionBegin;
+  PetscCall(SNESGetDM(ts->snes, &dm));
+  PetscCall(DMGetDMSNES(dm, &sdm));
+  PetscCall(DMGetDMTS(dm, &tdm));
+  if (!sdm->ops->computejacobian && tdm->ops->i2jacobian) PetscCall(DMSNESSetJacobian(dm, SNESTSFormJacobian, ts));
+  PetscCall(SNESSetUp(ts->snes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode LoadNewton(TS ts, Archive &a)
 {
   Integrator &I = Get(ts);
@@ -157,7 +173,7 @@ PetscErrorCode LoadNewton(TS ts, Archive &a)
 
   PetscFunctionBegin;
   PetscCall(ReadMatrixState(ts, a, &m));
-  PetscCall(SNESSetUp(ts->snes));
+  PetscCall(SetUpSNES(ts));
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(SNESGetJacobian(ts->snes, &J, &P, NULL, NULL));
   PetscCall(GivesRows(J, &rows));

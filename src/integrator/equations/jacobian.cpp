@@ -80,7 +80,7 @@ PetscErrorCode SetUpJacobian(TS ts)
     PetscBool dense = PETSC_FALSE; /* it tells no pattern; another type of TS without a Jacobian has left it */
     if (P) PetscCall(PetscObjectTypeCompareAny((PetscObject)P, &dense, MATSEQDENSE, MATMPIDENSE, ""));
     if (dense) P = NULL;
-    PetscCall(SetUpDifferences(ts, dm, has && pattern ? NULL : P, has && pattern ? PETSC_TRUE : shell));
+    PetscCall(SetUpDifferences(ts, dm, pattern ? NULL : P, pattern ? PETSC_TRUE : shell));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
