@@ -107,3 +107,24 @@ TEST(FrontDoor, OneVectorForBoth)
   EXPECT_EQ(run.solve(), PETSC_ERR_ARG_IDN);
   EXPECT_TRUE(trap.says("one vector for both")) << trap.message;
 }
+
+/* Made by SNESCreate(), without a DM and without a solution */
+TEST(FrontDoor, ASNESOfTheProgram)
+{
+  const Pendulum p(-90., 0., 1.);
+  Simulation     own(p, tolerance(1e-5)), given(p, tolerance(1e-5));
+  Mat            J;
+  SNES           snes;
+  TSI2Jacobian   f;
+  void          *ctx;
+  must(TSGetI2Jacobian(given.ts, &J, nullptr, &f, &ctx));
+  must(PetscObjectReference((PetscObject)J));
+  must(SNESCreate(PETSC_COMM_SELF, &snes));
+  must(TSSetSNES(given.ts, snes));
+  must(SNESDestroy(&snes));
+  must(TSSetI2Jacobian(given.ts, J, J, f, ctx));
+  must(MatDestroy(&J));
+  must(own.solve());
+  must(given.solve());
+  EXPECT_EQ(given.u(), own.u());
+}

@@ -189,6 +189,7 @@ TEST(RefusedSettings, SolvesThatGoOnFromOthers)
 {
   expectRefused({"-ksp_type gmres -pc_type none -snes_ksp_ew", "-snes_ksp_ew"});
   expectRefused({"-ksp_type gmres -ksp_diagonal_scale", "-ksp_diagonal_scale"});
+  expectRefused({"-ksp_type cg -ksp_initial_guess_nonzero", "-ksp_initial_guess_nonzero"});
   expectRefused({"-ksp_type gmres -ksp_diagonal_scale -ksp_diagonal_scale_fix", "-ksp_diagonal_scale"});
 }
 

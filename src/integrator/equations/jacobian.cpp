@@ -63,6 +63,7 @@ PetscErrorCode SetUpJacobian(TS ts)
   PetscCall(TSGetSNES(ts, &snes));
   PetscCall(HooksTakeOver(ts, snes));
   PetscCall(TSGetDM(ts, &dm));
+  if (snes->dmAuto) PetscCall(SNESSetDM(snes, dm)); /* of a SNES that came by TSSetSNES(), whose own makes no vectors (FrontDoor.ASNESOfTheProgram) */
   PetscCall(WhoFillsMatrix(dm, &has, &wanted, &pattern));
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
   PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMSHELL, &shell));

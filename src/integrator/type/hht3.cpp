@@ -205,8 +205,8 @@ PetscErrorCode MethodOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   Integrator &I = Get(ts);
   TSHHT3Form  form = I.form;
   TSHHT3Start start = I.start_policy;
-  PetscReal   alpha = I.alpha, rho = I.radius, c = I.corrector.c, reuse[3] = {I.corrector.ratio, I.corrector.slow_rate, I.corrector.hold};
-  PetscInt    degree = I.predictor.fixed ? I.predictor.degree_max : -1, three = 3, order = I.order.wanted;
+  PetscReal   alpha = I.alpha, rho = I.radius, c = I.corrector.c, reuse[4] = {I.corrector.ratio, I.corrector.slow_rate, I.corrector.hold}; /* and one too many */
+  PetscInt    degree = I.predictor.fixed ? I.predictor.degree_max : -1, numbers = 4, order = I.order.wanted;
   const char *const orders[] = {"2", "3", "4", "5", "auto"};
   PetscBool   flg;
 
@@ -223,9 +223,9 @@ PetscErrorCode MethodOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   if (flg) PetscCall(TSHHT3SetCorrectorTolerance(ts, c));
   PetscCall(PetscOptionsInt("-ts_hhtdae_predictor_degree", "Degree 0..3 of the predictor, -1 to choose it in each step", "TSHHT3SetPredictorDegree", degree, &degree, &flg));
   if (flg) PetscCall(TSHHT3SetPredictorDegree(ts, degree));
-  PetscCall(PetscOptionsRealArray("-ts_hhtdae_reuse", "Matrix reuse: ratio of h, rate, growth of h not taken", "TSHHT3SetReuse", reuse, &three, &flg));
+  PetscCall(PetscOptionsRealArray("-ts_hhtdae_reuse", "Matrix reuse: ratio of h, rate, growth of h not taken", "TSHHT3SetReuse", reuse, &numbers, &flg));
   if (flg) {
-    PetscCheck(three == 3, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG, "-ts_hhtdae_reuse takes three numbers, ratio,rate,hold; %" PetscInt_FMT " were given", three);
+    PetscCheck(numbers == 3, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG, "-ts_hhtdae_reuse takes three numbers, ratio,rate,hold; %" PetscInt_FMT "%s were given", numbers, numbers > 3 ? " or more" : "");
     PetscCall(TSHHT3SetReuse(ts, reuse[0], reuse[1], reuse[2]));
   }
   PetscCall(PetscOptionsEnum("-ts_hhtdae_start", "What to do about inconsistent initial values", "TSHHT3SetStart", TSHHT3Starts, (PetscEnum)start, (PetscEnum *)&start, &flg));
@@ -247,6 +247,7 @@ PetscErrorCode OutputOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   if (on) PetscCall(TSMonitorSet(ts, MonitorSummary, NULL, NULL));
   PetscCall(PetscOptionsString("-ts_hhtdae_checkpoint", "File to write a checkpoint to", "TSHHT3CheckpointSave", I.checkpoint_file, I.checkpoint_file, sizeof(I.checkpoint_file), NULL));
   PetscCall(PetscOptionsInt("-ts_hhtdae_checkpoint_every", "Accepted steps from one checkpoint to the next", "TSHHT3CheckpointSave", I.checkpoint_every, &I.checkpoint_every, NULL));
+  PetscCheck(I.checkpoint_every >= 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "-ts_hhtdae_checkpoint_every %" PetscInt_FMT ": a number of steps, or 0 for the end of the run alone", I.checkpoint_every);
   if (I.checkpoint_file[0]) PetscCall(TSMonitorSet(ts, MonitorCheckpoint, NULL, NULL));
   PetscCall(PetscOptionsString("-ts_hhtdae_resume", "Checkpoint to go on from", "TSHHT3CheckpointLoad", file, file, sizeof(file), &flg));
   if (flg && file[0]) PetscCall(PetscStrncpy(I.resume_file, file, sizeof(I.resume_file)));

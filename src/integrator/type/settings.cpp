@@ -104,12 +104,14 @@ PetscErrorCode CheckMultigrid(TS ts)
 PetscErrorCode CheckSolves(TS ts)
 {
   KSP       ksp;
-  PetscBool ew, scales;
+  PetscBool ew, scales, guess;
 
   PetscFunctionBegin;
   PetscCall(SNESKSPGetUseEW(ts->snes, &ew));
   PetscCheck(!ew, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-snes_ksp_ew sets the tolerance of a linear solve by norms of residuals, which the corrector does not take; use -ksp_rtol");
   PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &guess));
+  PetscCheck(!guess, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-ksp_initial_guess_nonzero begins a solve with the last correction, which is far larger than the next one: corrections have no better guess than zero");
   PetscCall(KSPGetDiagonalScale(ksp, &scales));
   PetscCheck(!scales, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP, "-ksp_diagonal_scale changes the Newton matrix, of which the corrector makes use after a solve; it is scaled already, and -pc_type jacobi scales a solve");
   PetscFunctionReturn(PETSC_SUCCESS);
