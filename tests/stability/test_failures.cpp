@@ -109,6 +109,25 @@ TEST(Failures, TooManyRejections)
   EXPECT_TRUE(trap.says("rejected too often")) << trap.message;
 }
 
+/* The cause is that of the last rejection: a domain of the application's, a tolerance below rounding */
+TEST(Failures, CauseOfTheLastRejection)
+{
+  const Pendulum p(-90., 0., 1.);
+  Simulation     bounded(p, tolerance(1e-5)), exact(p, tolerance(1e-16));
+  must(TSSetFunctionDomainError(bounded.ts, [](TS, PetscReal t, Vec, PetscBool *in) -> PetscErrorCode {
+    *in = (PetscBool)(t < .5);
+    return 0;
+  }));
+  {
+    ErrorTrap trap;
+    EXPECT_EQ(bounded.solve(), PETSC_ERR_NOT_CONVERGED);
+    EXPECT_TRUE(trap.says("TSSetFunctionDomainError()")) << trap.message;
+  }
+  ErrorTrap trap;
+  EXPECT_EQ(exact.solve(), PETSC_ERR_NOT_CONVERGED);
+  EXPECT_TRUE(trap.says("the error test at")) << trap.message;
+}
+
 TEST(Failures, TooManyFailedCorrections)
 {
   const Spoiled p(2., NAN, [](int, double t) { return t > .5; });

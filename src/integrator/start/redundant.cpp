@@ -27,7 +27,8 @@ PetscErrorCode NameRedundant(TS ts)
   PetscCall(MatrixIsSingular(ts, &is_singular));
   if (!is_singular) PetscCall(ExplainLinearFailure(ts, ts->ptime, 0));
   PetscCheck(is_singular, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
-             "No consistent accelerations and multipliers were found: %s. The matrix [M Phi_q^T; Phi_q 0] is indefinite; without -ksp_type and -pc_type it is factored directly", I.failure);
+             "No consistent accelerations and multipliers were found: %s. %s; without -ksp_type and -pc_type it is factored directly", I.failure,
+             I.constraints() ? "The matrix [M Phi_q^T; Phi_q 0] is indefinite" : "The solver has not solved with the matrix of the start, M");
   PetscCall(VecGetOwnershipRange(I.X, &start, NULL));
   for (PetscInt &i : list) i += start;
   if (I.constraints()) {

@@ -227,6 +227,7 @@ PetscErrorCode AttemptStep(TS ts, PetscBool *tiny, PetscBool *ok)
   /* it judges by what SNES said last, and so knows nothing of a failure before SNES was asked */
   PetscCall(TSAdaptCheckStage(ts->adapt, ts, I.t1, I.U1, &stage));
   if (!*ok && stage) ts->time_step *= ts->adapt->scale_solve_failed;
+  if (*ok && !stage) PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "TSAdapt, or the function of TSSetFunctionDomainError(), does not take the state at t = %g", (double)I.t1));
   *ok = (PetscBool)(*ok && stage);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -274,6 +275,8 @@ PetscErrorCode AcceptOrReject(TS ts, PetscBool tiny, PetscReal *next, PetscBool 
     PetscCall(VecCopy(I.U0, ts->vec_sol));
     PetscCall(VecCopy(I.V0, ts->vec_dot));
     I.stat.rejected++;
+    if (I.wlte_pending < 0) PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "TSAdapt has not accepted the step to t = %g, h = %g", (double)I.t1, (double)I.h));
+    else PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "the error test at t = %g, h = %g (error %g of the tolerance)", (double)I.t1, (double)I.h, (double)I.wlte_pending));
     PetscCall(PetscInfo(ts, "step of %g from t = %g rejected by the error test, next %g\n", (double)I.h, (double)I.t0, (double)*next));
   } else if (!tiny) {
     PetscCall(NoteError(ts));
@@ -298,7 +301,7 @@ PetscErrorCode FailStep(TS ts, const char *what)
   PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
              "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
              "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).%s",
-             (double)ts->ptime, what, (double)I.h, I.failure[0] ? I.failure : "the error test", (double)ts->ptime, hint);
+             (double)ts->ptime, what, (double)I.h, I.failure, (double)ts->ptime, hint);
   PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s\n", (double)ts->ptime, what, I.failure));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
