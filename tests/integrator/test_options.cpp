@@ -83,8 +83,8 @@ TEST(Options, OutOfRangeFromTheCommandLineIsRefused)
   EXPECT_TRUE(trap.says("alpha = 0.2")) << trap.message;
   EXPECT_THROW(Simulation(p, "-ts_hhtdae_reuse 1.5,0.3"), std::runtime_error);
   EXPECT_THROW(Simulation(p, "-ts_hhtdae_reuse 1.5,0.3,1.1,2"), std::runtime_error);
-  EXPECT_THROW(Simulation(p, "-ts_hhtdae_checkpoint_every -3"), std::runtime_error);
   EXPECT_TRUE(trap.says("three numbers")) << trap.message;
+  EXPECT_THROW(Simulation(p, "-ts_hhtdae_checkpoint_every -3"), std::runtime_error);
 }
 
 TEST(Options, RadiusBelongsToTheSecondOrderForm)
