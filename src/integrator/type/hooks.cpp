@@ -177,8 +177,9 @@ PetscErrorCode TakeSNESFunctions(TS ts, SNES snes)
   PetscCall(DMGetDMSNES(dm, &sdm));
   PetscCheck(!sdm->ops->computefunction || sdm->ops->computefunction == SNESTSFormFunction || !snes->vec_func || snes->setupcalled, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
              "The SNES of the TS has a function of the program's own (SNESSetFunction()), which TSHHT3 cannot call: starts evaluate the I2Function of TSSetI2Function() alone, where what that function adds belongs. If it is that of another SNES on the DM of the TS, give both a DM of their own (DMClone())");
+  const bool jacobian = sdm->ops->computejacobian == SNESTSFormJacobian; /* asked before SNESSetFunction(), which frees what the DM has shared with another one */
   PetscCall(SNESSetFunction(snes, NULL, SNESTSFormFunction, ts));
-  if (sdm->ops->computejacobian == SNESTSFormJacobian) PetscCall(DMSNESSetJacobian(dm, SNESTSFormJacobian, ts));
+  if (jacobian) PetscCall(DMSNESSetJacobian(dm, SNESTSFormJacobian, ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
