@@ -3,6 +3,7 @@
 #include "hhtdae/helpers.h"
 #include "hhtdae/linearize.h"
 #include "hhtdae/query.h"
+#include "kernel_checks.h"
 #include "scene_start.h"
 #include <cmath>
 
@@ -438,6 +439,90 @@ TEST(Analyses, KinematicsWhereAMotionHasStoodStill)
         EXPECT_NEAR(load.moment(2), 60 * t * (1 - t) * (1 - 2 * t), 1e-5) << first << " " << t;
       }
     }
+}
+
+namespace
+{
+
+/* A body of mass and inertia 1 that a motion drives, on a pin or on a rail */
+struct DrivenBody {
+  Scene   scene{PETSC_COMM_SELF};
+  Element drive;
+
+  DrivenBody(bool turns, const TimeFunction &f)
+  {
+    const Body   body = scene.add("body", RigidBody());
+    const Marker i = scene.marker(body), j = scene.marker(scene.ground());
+    if (turns) scene.add("pin", Revolute{i, j});
+    else scene.add("rail", Translational{i, j});
+    drive = turns ? scene.add("drive", RotationalMotion{i, j, f}) : scene.add("drive", TranslationalMotion{i, j, f});
+  }
+};
+
+/* The motion's multiplier at t: the acceleration */
+double LoadAt(OwnTS &run, const DrivenBody &d, double t)
+{
+  Snapshot now;
+  double   load;
+  must(Kinematics(run.ts, t));
+  must(now.take(run.ts));
+  must(now.value(Measure::multiplier(d.drive, 0), &load));
+  return load;
+}
+
+} // namespace
+
+/* a (1 - cos w t), and a w t - a sin w t, where velocities vanish but for what rounding leaves of them: at the start, there again after other times, and at turning points. Differences
+   over any time that is long enough vanish, and so agree; times near a period do so sooner. */
+TEST(Analyses, KinematicsAtTurningPoints)
+{
+  using std::sin;
+  Random random(1);
+  double worst = 0;
+  for (int sample = 0; sample < 100; sample++) {
+    const double a = random(.1, 1), w = random(.3, 3), pi = std::acos(-1.);
+    const bool   turns = sample % 2, returns = sample / 2 % 2;
+    DrivenBody   d(turns, returns ? TimeFunction::harmonic(-a, w, pi / 2, a) : TimeFunction::formula([=](const auto &t) { return a * w * t - a * sin(w * t); }));
+    OwnTS        run(d.scene);
+    for (double t : {0., 0., 1., 0., pi / w, 1e-9, 2 * pi / w, 1.7, 3 * pi / w, 20 * pi / w, 4 * pi / w}) {
+      const double off = std::abs(LoadAt(run, d, t) / (a * w * w) - (returns ? std::cos(w * t) : std::sin(w * t)));
+      EXPECT_LT(off, 1e-5) << (turns ? "turn " : "way ") << (returns ? "to and fro, " : "on, ") << a << ", " << w << " at " << t;
+      worst = std::max(worst, off);
+    }
+  }
+  MEASURED("largest error: %.1e", worst);
+}
+
+/* In days what takes a second takes 1e-5, and in microseconds what takes a second 1e6 */
+TEST(Analyses, KinematicsInAnyUnitsOfTime)
+{
+  for (double w : {5e-6, 1e-3, 1., 1e3, 1e6})
+    for (bool turns : {false, true}) {
+      DrivenBody d(turns, TimeFunction::harmonic(.7, w));
+      d.scene.start().assembly = Assembly::Project;
+      OwnTS run(d.scene);
+      for (double x : {1., 2., .5, 4.}) EXPECT_NEAR(LoadAt(run, d, x / w) / (.7 * w * w), -std::sin(x), 1e-4) << (turns ? "turn " : "way ") << w << " at " << x / w;
+    }
+}
+
+/* A motion of T seconds that has hardly begun or is nearly over: the velocity is no rounding, and yet says nothing of T, also where it is another time's */
+TEST(Analyses, KinematicsAfterVelocitiesNearZero)
+{
+  Random random(1);
+  double worst = 0;
+  for (int sample = 0; sample < 50; sample++) {
+    const double T = std::pow(10, random(-1, 1)), a = random(.1, 2);
+    for (bool turns : {false, true}) {
+      DrivenBody d(turns, TimeFunction::step5(0, 0, T, a));
+      OwnTS  run(d.scene);
+      for (double x : {0., .3, 1., .6, 1.2, .9, 0., 1e-4, .5, .99, .1, 1e-3, .7}) {
+        const double off = std::abs(LoadAt(run, d, x * T) * T * T / a - (x < 1 ? 60 * x * (1 - x) * (1 - 2 * x) : 0));
+        EXPECT_LT(off, 3e-3) << (turns ? "turn" : "way") << " of " << a << " in " << T << " s, at " << x;
+        worst = std::max(worst, off);
+      }
+    }
+  }
+  MEASURED("largest error: %.1e", worst);
 }
 
 /* In units in which the scene is large a sine that cannot get nearer than 1e-4 is no small misfit either */

@@ -79,29 +79,21 @@ PetscErrorCode NoteChanges(const Integrator &I, PetscReal tau, Vec before, Vec a
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-} // namespace
-
-/* At U0, V0, t_n: I.excitation has the time within which each row follows time, PETSC_MAX_REAL where it does not depend on it; none: no row does */
-PetscErrorCode FindExcitation(TS ts)
+/* At U0, V0, t_n: the time within which each row follows time, sought up to `stop` from there, PETSC_MAX_REAL where it does not depend on it. Of ramps it is `of_ramps`, and at least
+   what is `known` of a row. Returned, too: the least of those that change all along. */
+PetscErrorCode FollowTime(TS ts, PetscReal stop, PetscReal of_ramps, Vec known, Vec within, PetscReal *swing)
 {
   Integrator     &I    = Get(ts);
-  PetscReal       stop = ts->max_time - ts->ptime;
   const PetscReal step = ts->time_step != unset_step && ts->time_step > 0 ? ts->time_step : PETSC_MAX_REAL; /* of the user's, and those later: what it may follow is looked for */
-  WorkVec         zero, F[2], before;
+  WorkVec         zero, F[2];
   Changes         c;
-  PetscReal       swing = PETSC_MAX_REAL, part = 1, last;
+  PetscReal       least = PETSC_MAX_REAL, part = 1, last;
 
   PetscFunctionBegin;
-  I.ahead = Ahead::Unknown;
-  if (!(ts->max_time < PETSC_MAX_REAL / 2 && stop > 0)) PetscCall(TimeScale(ts, &stop)); /* of a run without end */
   for (WorkVec *v : {&zero, &F[0], &F[1], &c.largest, &c.number}) PetscCall(v->like(I.U0));
-  PetscCall(before.like(I.U0));
-  PetscCall(VecZeroEntries(before));
-  if (I.excitation && ts->ptime > I.t_begin) PetscCall(VecCopy(I.excitation, before));
-  if (!I.excitation) PetscCall(VecDuplicate(I.U0, &I.excitation));
-  c.shortest = I.excitation;
+  c.shortest = within;
   for (Vec v : {(Vec)zero, (Vec)c.largest, (Vec)c.number}) PetscCall(VecZeroEntries(v));
-  PetscCall(VecSet(I.excitation, PETSC_MAX_REAL));
+  PetscCall(VecSet(within, PETSC_MAX_REAL));
   PetscCall(EvaluateResidual(ts, ts->ptime + first_sample * stop, I.U0, I.V0, zero, F[0]));
   PetscReal tau = first_sample * stop;
   for (int sample = 1, still = 0; sample < min_samples || (sample < max_samples && (still < quiet_samples || (tau > step && step < stop))); sample++) {
@@ -113,13 +105,42 @@ PetscErrorCode FindExcitation(TS ts)
   }
   PetscCall(ForEntries(
     [&](PetscInt, PetscScalar number, PetscScalar of_old, PetscScalar &T) {
-      const PetscReal known = PetscRealPart(of_old) < PETSC_MAX_REAL ? PetscRealPart(of_old) : 0;
-      if (PetscRealPart(number) > 0 && PetscRealPart(T) >= ramp_spread * stop) T = PetscMax(ramp_time * stop, known);
+      const PetscReal old = PetscRealPart(of_old) < PETSC_MAX_REAL ? PetscRealPart(of_old) : 0;
+      if (PetscRealPart(number) > 0 && PetscRealPart(T) >= ramp_spread * stop) T = PetscMax(of_ramps, old);
     },
-    Read(c.number), Read(before), Write(I.excitation)));
+    Read(c.number), Read(known), Write(within)));
+  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar T) { if (PetscRealPart(number) >= changes_of_swing) least = PetscMin(least, PetscRealPart(T)); }, Read(c.number), Read(within)));
+  PetscCallMPI(MPI_Allreduce(&least, swing, 1, MPIU_REAL, MPIU_MIN, PetscObjectComm((PetscObject)ts)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+} // namespace
+
+/* I.excitation: the time within which each row follows time; none: no row does. In a run without end ramps are such as long as they have been looked at, and no longer
+   (Analyses.KinematicsAfterVelocitiesNearZero). The velocities say how long that is, but may be those of another time, or nearly zero: what happens within the unit of time is looked for, too
+   (the same test, and Analyses.KinematicsWhereAMotionHasStoodStill). */
+PetscErrorCode FindExcitation(TS ts)
+{
+  Integrator     &I    = Get(ts);
+  PetscReal       stop = ts->max_time - ts->ptime, swing;
+  const bool      ends = ts->max_time < PETSC_MAX_REAL / 2 && stop > 0;
+  WorkVec         before;
+
+  PetscFunctionBegin;
+  I.ahead = Ahead::Unknown;
+  if (!ends) PetscCall(TimeScale(ts, &stop));
+  PetscCall(before.like(I.U0));
+  PetscCall(VecZeroEntries(before));
+  if (I.excitation && ts->ptime > I.t_begin) PetscCall(VecCopy(I.excitation, before));
+  if (!I.excitation) PetscCall(VecDuplicate(I.U0, &I.excitation));
+  PetscCall(FollowTime(ts, stop, ends ? ramp_time * stop : stop, before, I.excitation, &I.swing));
+  if (!ends && stop > unit_of_time) {
+    PetscCall(VecCopy(I.excitation, before));
+    PetscCall(FollowTime(ts, unit_of_time, unit_of_time, before, I.excitation, &swing));
+    PetscCall(VecPointwiseMin(I.excitation, I.excitation, before));
+    I.swing = PetscMin(I.swing, swing);
+  }
   PetscCall(VecMin(I.excitation, NULL, &I.fastest));
-  PetscCall(ForEntries([&](PetscInt, PetscScalar number, PetscScalar T) { if (PetscRealPart(number) >= changes_of_swing) swing = PetscMin(swing, PetscRealPart(T)); }, Read(c.number), Read(I.excitation)));
-  PetscCallMPI(MPI_Allreduce(&swing, &I.swing, 1, MPIU_REAL, MPIU_MIN, PetscObjectComm((PetscObject)ts)));
   if (I.fastest >= PETSC_MAX_REAL) PetscCall(VecDestroy(&I.excitation));
   else PetscCall(PetscInfo(ts, "start: loads or motions follow time within %g\n", (double)I.fastest));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -156,15 +156,19 @@ constexpr PetscReal longest_time_scale = 1e3;
    rounding (BetweenRuns.ShortRunsHaveTheirMultipliers). What would take more does not move. */
 constexpr PetscReal longest_in_runs = 1e9;
 
-/* 1/rate, in place of one beyond so many runs the whole run where it has an end. Where it has none: what rounding leaves of velocities is no time scale
-   (Analyses.KinematicsWhereAMotionHasStoodStill), the time itself is the better one; at t = 0 the unit of time may be a millionth of what things take (Query.Units) */
+/* In a run without end velocities that would take longer are what rounding leaves of zero, which is no time scale: it is that of rest, over which differences are taken of what
+   time alone moves (Analyses.KinematicsAtTurningPoints). The unit of time may be a millionth of what things take (Analyses.KinematicsInAnyUnitsOfTime). */
+constexpr PetscReal longest_without_end = 1e6;
+
+/* 1/rate, in place of one beyond so many runs the whole run */
 PetscReal TimeOf(TS ts, PetscReal rate, PetscReal within)
 {
-  const Integrator &I    = Get(ts);
-  const bool        ends = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin;
-  PetscReal         span = ends ? ts->max_time - I.t_begin : !(rate > 0) ? 1 : ts->ptime != 0 ? longest_time_scale * PetscAbsReal(ts->ptime) : longest_time_scale * longest_time_scale;
-  if (I.excitation && I.fastest < span / longest_time_scale) span = longest_time_scale * I.fastest;
-  return rate > 0 && 1 / rate < (ends ? within : 1) * span ? 1 / rate : span;
+  const Integrator &I       = Get(ts);
+  const bool        ends    = ts->max_time < PETSC_MAX_REAL / 2 && ts->max_time > I.t_begin;
+  const PetscReal   longest = I.excitation ? longest_time_scale * I.fastest : PETSC_MAX_REAL;
+  if (!ends) return PetscMin(rate > 1 / longest_without_end ? 1 / rate : unit_of_time, longest);
+  const PetscReal span = PetscMin(ts->max_time - I.t_begin, longest);
+  return rate > 0 && 1 / rate < within * span ? 1 / rate : span;
 }
 
 } // namespace

@@ -24,6 +24,7 @@ PetscErrorCode StartFromSolution(TS ts);
 
 /* How fast loads and motions are that depend on time alone, excitation.cpp */
 PetscErrorCode FindExcitation(TS ts);
+constexpr PetscReal unit_of_time      = 1;    /* the time scale of what is at rest in a run without end */
 constexpr PetscReal coasting_fraction = 0.02; /* of the run: the longest step where nothing moves, though loads or motions follow time */
 PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V);
 PetscErrorCode WarnOfUnfollowedLoads(TS ts);
