@@ -392,7 +392,12 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
   PetscCall(TSGetTime(from, &t));
   PetscCall(TSGetTolerances(from, &atol, nullptr, &rtol, nullptr));
   PetscCall(TS2GetSolution(from, &U, &V));
-  if (journal_) {
+  bool anew = !journal_->parameters.empty();
+  if (!anew) {
+    PetscCall(setUp());
+    anew = model_ != old->model; /* it was set up with another start */
+  }
+  if (anew) {
     journal_->stale = true;
     PetscCall(Guarded([&] {
       describeAnew();

@@ -1,4 +1,4 @@
-/* Parameters of a scene: after a change the calls that describe the scene are repeated. */
+/* Parameters of a scene: after a change of them, or of how runs start, the calls that describe the scene are repeated. */
 #include "journal.h"
 #include <cmath>
 
@@ -21,11 +21,6 @@ void Scene::record(std::function<void(Scene &)> call)
 Parameter Scene::parameter(const std::string &name, double value)
 {
   const SceneData &s = data();
-  if (!journal_) {
-    journal_ = std::make_unique<Journal>();
-    if (s.gravity != Vector3::Zero()) record([g = s.gravity](Scene &again) { again.gravity(g); }); /* gravity may have been set before the first parameter */
-    if (!s.ground_acceleration.empty()) record([a = s.ground_acceleration](Scene &again) { again.groundAcceleration(a[0], a[1], a[2]); });
-  }
   const auto fault = [&](const char *what) {
     journal_->errors.push_back("parameter " + name + ": " + what);
     data().errors.push_back(journal_->errors.back());
@@ -44,9 +39,8 @@ PetscErrorCode Scene::set(const std::string &name, double value)
 {
   PetscFunctionBegin;
   std::string known;
-  if (journal_)
-    for (const auto &p : journal_->parameters) known += (known.empty() ? "" : ", ") + p.first;
-  PetscCheck(journal_ && journal_->parameters.count(name), data().comm, PETSC_ERR_ARG_WRONG, "Scene::set(): there is no parameter %s, %s%s", name.c_str(),
+  for (const auto &p : journal_->parameters) known += (known.empty() ? "" : ", ") + p.first;
+  PetscCheck(journal_->parameters.count(name), data().comm, PETSC_ERR_ARG_WRONG, "Scene::set(): there is no parameter %s, %s%s", name.c_str(),
              known.empty() ? "in fact none" : "but ", known.c_str());
   PetscCheck(std::isfinite(value), data().comm, PETSC_ERR_ARG_OUTOFRANGE, "Scene::set(): %s cannot be %g", name.c_str(), value);
   double &now     = *journal_->parameters[name].value_;
@@ -58,7 +52,7 @@ PetscErrorCode Scene::set(const std::string &name, double value)
 /* Repeats the recorded calls with a new model; existing runs keep the old one */
 void Scene::describeAnew()
 {
-  if (!journal_ || !journal_->stale) return;
+  if (!journal_->stale) return;
   auto       next = std::make_shared<Model>();
   SceneData &s    = next->scene;
   s.number        = number_;

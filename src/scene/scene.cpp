@@ -3,7 +3,9 @@
 #include "guard.h"
 #include "journal.h"
 #include "start.h"
+#include <cctype>
 #include <cmath>
+#include <sstream>
 
 namespace hhtdae
 {
@@ -22,7 +24,7 @@ PetscInt NextNumber()
 SceneData::SceneData()  = default;
 SceneData::~SceneData() = default;
 
-Scene::Scene(MPI_Comm comm, Space space) : number_(NextNumber()), model_(std::make_shared<Model>())
+Scene::Scene(MPI_Comm comm, Space space) : number_(NextNumber()), model_(std::make_shared<Model>()), journal_(std::make_unique<Journal>())
 {
   data().number = number_;
   data().comm   = comm;
@@ -244,12 +246,44 @@ static void BeginAnew(SceneData &s)
   s.started = StartResult();
 }
 
+/* Options of the linear solvers of assembly and equilibrium, one after another */
+static PetscErrorCode SolverOptions(std::string &given)
+{
+  char *all;
+  PetscFunctionBegin;
+  given.clear();
+  PetscCall(PetscOptionsGetAll(nullptr, &all));
+  std::istringstream words(all);
+  PetscCall(PetscFree(all));
+  bool ours = false; /* a value belongs to the name before it */
+  for (std::string word; words >> word;) {
+    if (word[0] == '-' && !(word.size() > 1 && (std::isdigit(word[1]) || word[1] == '.'))) ours = word.rfind("-scene_assemble_", 0) == 0 || word.rfind("-scene_equilibrium_", 0) == 0;
+    if (ours) given += word + " ";
+  }
+  PetscFunctionReturn(0);
+}
+
+/* Whether the present model was set up with another start(), or with other options of the set-up. These are asked for in any case, so that they count as used. */
+static PetscErrorCode StartHasChanged(const SceneData &s, const StartPolicy &given, const std::string &solvers, bool *changed)
+{
+  SceneData   now;
+  std::string solvers_now;
+  PetscFunctionBegin;
+  now.comm  = s.comm;
+  now.start = given;
+  PetscCall(ReadStartOptions(now));
+  PetscCall(SolverOptions(solvers_now));
+  *changed = !SameStart(now.start, s.start) || solvers_now != solvers;
+  PetscFunctionReturn(0);
+}
+
 /* Users' constraints are evaluated here, and may throw */
 PetscErrorCode Scene::setUp()
 {
   PetscFunctionBegin;
   PetscCall(Guarded([&]() -> PetscErrorCode {
     PetscFunctionBegin;
+    if (model_->compiled && !journal_->stale && data().errors.empty()) PetscCall(StartHasChanged(data(), start_, journal_->solvers, &journal_->stale));
     describeAnew();
     Model     &M = *model_;
     SceneData &s = M.scene;
@@ -262,6 +296,7 @@ PetscErrorCode Scene::setUp()
     PetscCall(TSHHT3Initialize());
     PetscCall(DeclareSceneOptions());
     PetscCall(ReadStartOptions(s));
+    PetscCall(SolverOptions(journal_->solvers));
     PetscCall(CheckDescription(s));
     if (M.continues) s.start.time = M.begin;
     else PetscCall(Partition(s, M.size, M.number.owner));

@@ -135,7 +135,6 @@ TEST(SceneRuns, CallsAfterTheSetUp)
     {"channel late", [](Winder &w) { w.scene.channel("late", Measure::time()); }},
     {"shape", [](Winder &w) { w.scene.shape(w.wheel, Shape::sphere(1)); }},
     {"line", [](Winder &w) { w.scene.line({w.on, w.at}); }},
-    {"Scene::start()", [](Winder &w) { w.scene.start().tolerance = 1; }},
   };
   for (const auto &[name, call] : calls) {
     Winder   w;
@@ -147,6 +146,29 @@ TEST(SceneRuns, CallsAfterTheSetUp)
     expectError(w.scene.createTS(&ts), trap, name);
     EXPECT_TRUE(trap.says("after")) << trap.message;
   }
+}
+
+/* Bodies are where they were for a run that goes on with coordinates of another kind */
+TEST(SceneRuns, GoesOnWithAnotherStart)
+{
+  Scene     s(PETSC_COMM_SELF);
+  RigidBody top;
+  TS        next;
+  PetscReal t;
+  Array     before, after;
+  top.angular_velocity = {0.3, 0, 2};
+  s.channel("x", Measure::displacement(s.marker(s.add("top", top), {1, 0, 0}), 0));
+  SceneRun run(s, 0.5, tolerance(1e-6));
+  must(run.solve());
+  must(s.sample(run.ts, 0.5, before));
+  s.start().rotations = Rotations::Euler313;
+  must(s.createTS(&next, run.ts));
+  must(TSGetTime(next, &t));
+  must(s.sample(next, 0.5, after));
+  EXPECT_EQ(t, 0.5);
+  EXPECT_NEAR(before[0], std::cos(1.), 0.1); /* it has turned */
+  EXPECT_NEAR(before[0], after[0], 1e-12);
+  must(TSDestroy(&next));
 }
 
 TEST(SceneRuns, HandlesOfAnotherScene)

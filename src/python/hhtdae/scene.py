@@ -375,7 +375,8 @@ class Scene:
         self._core.line(list(markers))
 
     def start(self, **policy):
-        """How runs start; options of the command line come after it.
+        """How runs start that are made from now on; options of the command line and those of `run` come after it. Runs that were made before keep what they had; where
+        it is another start than that of the last run, the next one sets the scene up again.
 
         Parameters
         ----------
@@ -498,7 +499,7 @@ class Scene:
         after : Run, optional
             The run goes on where that one is, with parameters as they are now.
         options : dict, optional
-            PETSc's options without the dash, ``{"ts_adapt_type": "none", "ts_dt": 1e-3}``; those of the command line win.
+            PETSc's options without the dash, ``{"ts_adapt_type": "none", "ts_dt": 1e-3}``, for this run alone; those of the command line win.
         page : bool or str
             Records frames for `Run.page`; a string names the file that they are written to, else it is a temporary one. Title, and number of frames or
             time between them, are those of `output`.

@@ -1,0 +1,75 @@
+"""Runs of one scene that begin in different ways: each is what it would be alone."""
+
+import unittest
+import warnings
+
+import numpy as np
+
+import hhtdae as h
+
+
+def arm(described=None):
+    """A pendulum in millimetres, which the tolerance of angles makes slow"""
+    scene = h.Scene(gravity=(0, 0, -9810.))
+    rod = scene.add("rod", h.RigidBody(1e-3, [1., 1, 1], position=(500, 0, 0), rotation=h.rotation((0, 0, 1), 0.1)))
+    scene.connect("pin", h.Revolute, rod, scene.ground, (0, 0, 0), axis=(0, 1, 0))
+    i, j = rod.marker(), scene.ground.marker((0, 0, -2000.))
+    spring = h.SpringDamper(i, j, stiffness=1e-6)
+    scene.add("spring", spring if described is None else lambda: described.append(0) or spring)
+    scene.channel("z", h.displacement(i, "z"))
+    return scene
+
+
+def solve(scene, options=None):
+    return scene.solve(0.5, tolerance=1e-2, options=options)
+
+
+class Starts(unittest.TestCase):
+    def test_options(self):
+        """Those of the set-up hold for the runs that they are given to, and the scene is set up again for no other reason"""
+        described = []
+        scene = arm(described)
+        alone, others = solve(scene), 0
+        count = len(described)
+        for options, what in (({"scene_equilibrium": True}, lambda r: r["z"][-1]), ({"scene_angle_tol": 1e-6}, lambda r: r.steps), ({"scene_start_time": 0.2}, lambda r: r.times[0]),
+                              ({"scene_rotations": "euler313"}, lambda r: r.ts.getSolution2()[0].array[4])):
+            expected = what(solve(arm(), options))
+            self.assertNotEqual(expected, what(alone))
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")  # that nobody has asked for an option
+                for _ in range(2):
+                    self.assertEqual(what(solve(scene, options)), expected)
+                for _ in range(2):
+                    np.testing.assert_array_equal(solve(scene).values, alone.values)
+            others += 2
+            self.assertEqual(len(described), count + others)
+
+    def test_options_of_a_run_that_goes_on(self):
+        scene = arm()
+        run, other = (scene.run(tolerance=1e-4, options=o).solve(0.25) for o in (None, {"scene_rotations": "euler313"}))
+        for before in (run, other):
+            for options in (None, {"scene_rotations": "euler313"}, {"scene_angle_tol": 1e-6, "scene_equilibrium": True}):
+                after = scene.run(tolerance=1e-4, after=before, options=options)
+                self.assertEqual(after.time, 0.25)
+                self.assertAlmostEqual(after.sample()["z"], before["z"][-1], delta=1e-5)
+                self.assertAlmostEqual(after.solve(0.5)["z"][-1], arm().solve(0.5, tolerance=1e-4)["z"][-1], delta=1.)
+
+    def test_start(self):
+        """It holds for runs that are made from then on: the study of a tolerance needs one scene"""
+        scene, runs = arm(), []
+        for tolerance in (0., 1e-6, 0.):
+            scene.start(angle_tol=tolerance)
+            runs.append(scene.run(tolerance=1e-2))
+        scene.start(time=3., assembly="project")
+        self.assertEqual(scene.run().time, 3.)
+        steps = [r.solve(0.5).steps for r in runs]
+        self.assertEqual(steps[0], steps[2])
+        self.assertGreater(steps[1], 3 * steps[0])
+        scene.start(time=0., equilibrium=True)
+        self.assertAlmostEqual(solve(scene)["z"][-1], -500., delta=1e-3)
+        scene.start(equilibrium=False)
+        np.testing.assert_array_equal(solve(scene).values, runs[0].values)
+
+
+if __name__ == "__main__":
+    unittest.main()
