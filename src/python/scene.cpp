@@ -210,19 +210,22 @@ void BindScene(py::module_ &m)
       for (const ModalAttachment &a : b.attachments) all[a.name.c_str()] = FromVector(a.position);
       return all;
     });
+  /* Bodies, markers, elements and gravity may be described by Python functions, whose exceptions, Ctrl-C too, go on as they are */
   py::class_<Scene, ScenePointer>(m, "Scene")
     .def(py::init([](py::object comm, bool planar) { return std::make_shared<Scene>(ToComm(comm), planar ? Space::Planar : Space::Spatial); }))
     .def("ground", [](Scene &s) { return Out(s.ground()); })
-    .def("rigid_body", [](Scene &s, const std::string &n, py::object d) { return Out(AddBody(s, n, d, ToRigid)); })
-    .def("point_mass", [](Scene &s, const std::string &n, py::object d) { return Out(AddBody(s, n, d, ToPoint)); })
-    .def("flexible_body", [](Scene &s, const std::string &n, py::object d) { return Out(AddBody(s, n, d, ToFlexible)); })
+    .def("rigid_body", [](Scene &s, const std::string &n, py::object d) { return Out(Directly([&] { return AddBody(s, n, d, ToRigid); })); })
+    .def("point_mass", [](Scene &s, const std::string &n, py::object d) { return Out(Directly([&] { return AddBody(s, n, d, ToPoint); })); })
+    .def("flexible_body", [](Scene &s, const std::string &n, py::object d) { return Out(Directly([&] { return AddBody(s, n, d, ToFlexible); })); })
     .def("attachment", [](Scene &s, py::object body, const std::string &name) { return Out(s.attachment(ToHandle<Body>(body, "the flexible body"), name)); })
     .def("node", [](Scene &s, py::object body, PetscInt label) { return Out(s.node(ToHandle<Body>(body, "the flexible body"), label)); })
-    .def("marker", [](Scene &s, py::object b, py::object p, const std::string &n, bool at) { return Out(AddMarker(s, b, p, n, at)); })
-    .def("element", [](Scene &s, const std::string &kind, const std::string &name, py::object fields) { return Out(AddElement(s, kind, name, fields)); })
+    .def("marker", [](Scene &s, py::object b, py::object p, const std::string &n, bool at) { return Out(Directly([&] { return AddMarker(s, b, p, n, at); })); })
+    .def("element", [](Scene &s, const std::string &kind, const std::string &name, py::object fields) {
+      return Out(Directly([&] { return AddElement(s, kind, name, fields); }));
+    })
     .def("variable", [](Scene &s, const std::string &name, py::object e, double initial) { return Out(s.variable(name, ToExpression(e), initial)); })
     .def("state", [](Scene &s, const std::string &name, py::object e, double initial) { return Out(s.state(name, ToExpression(e), initial)); })
-    .def("gravity", SetGravity)
+    .def("gravity", [](Scene &s, py::object g) { Directly([&] { SetGravity(s, g); }); })
     .def("ground_acceleration", [](Scene &s, py::object x, py::object y, py::object z) { s.groundAcceleration(ToTimeFunction(x), ToTimeFunction(y), ToTimeFunction(z)); })
     .def("parameter", [](Scene &s, const std::string &name, double value) { return s.parameter(name, value); })
     .def("set", [](Scene &s, const std::string &name, double value) { Check(s.set(name, value)); })

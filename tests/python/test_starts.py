@@ -1,6 +1,7 @@
-"""Runs of one scene that begin in different ways: each is what it would be alone."""
+"""Runs of one scene that begin in different ways: each is what it would be alone; descriptions that are interrupted."""
 
 import unittest
+import unittest.mock
 import warnings
 
 import numpy as np
@@ -69,6 +70,25 @@ class Starts(unittest.TestCase):
         self.assertAlmostEqual(solve(scene)["z"][-1], -500., delta=1e-3)
         scene.start(equilibrium=False)
         np.testing.assert_array_equal(solve(scene).values, runs[0].values)
+
+
+class Interrupted(unittest.TestCase):
+    def test_descriptions(self):
+        """An exception of a formula's evaluation, Ctrl-C say, is raised as it is, and is the cause of no later error"""
+        scene = h.Scene()
+        k = scene.parameter("k", 1.)
+        body = scene.add("b", h.RigidBody(mass=-1.))
+        marker = body.marker((1, 0, 0))
+        for error in (KeyboardInterrupt, LookupError):
+            for describe in (lambda: body.marker((k, 0, 0)), lambda: body.marker_at((k, 0, 0)), lambda: scene.set_gravity((0, 0, k))):
+                with unittest.mock.patch("hhtdae.scene.plain", side_effect=error), self.assertRaises(error):
+                    describe()
+            for part in (h.PointMass(mass=k), h.RigidBody(mass=k), h.SpringDamper(marker, scene.ground.marker(), stiffness=k)):
+                with unittest.mock.patch("hhtdae.spec.plain", side_effect=error), self.assertRaises(error):
+                    scene.add("", part)
+        with self.assertRaisesRegex(h.Error, "mass is -1") as caught:
+            scene.set_up()
+        self.assertIsNone(caught.exception.__cause__)
 
 
 if __name__ == "__main__":
