@@ -98,6 +98,7 @@ void BindLinearize(py::module_ &m)
       l.ts          = FromTS(ToTS(ts));
       Check(t.is_none() ? l.get().take(ToTS(ts), of) : l.get().take(ToTS(ts), t.cast<double>(), of));
     })
+    .def_property_readonly("ts", [](Linearized &l) { return l.get(), l.ts; })
     .def("close", [](Linearized &l) {
       l.small.reset();
       l.ts = py::none();

@@ -1,4 +1,4 @@
-"""Runs of one scene that begin in different ways: each is what it would be alone; descriptions that are interrupted."""
+"""Runs of one scene that begin in different ways: each is what it would be alone; states that are not steady; descriptions that are interrupted."""
 
 import unittest
 import unittest.mock
@@ -70,6 +70,60 @@ class Starts(unittest.TestCase):
         self.assertAlmostEqual(solve(scene)["z"][-1], -500., delta=1e-3)
         scene.start(equilibrium=False)
         np.testing.assert_array_equal(solve(scene).values, runs[0].values)
+
+
+class Steady(unittest.TestCase):
+    """response() warns where a state is neither in equilibrium nor steady"""
+
+    def warned(self, scene, body, omega=3., axes=None, run=None):
+        m = body.marker()
+        small = (run or scene.run()).linearize(axes=axes)
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            for _ in range(2):
+                small.response(h.Excitation.force(m, (0, 1, 0)), h.displacement(m, "y"), omega)
+        return [str(w.message) for w in told]
+
+    def pendulum(self, angle=0.5, speed=2.):
+        scene = h.Scene(gravity=(9.81, 0, 0), planar=True)
+        c, s = np.cos(angle), np.sin(angle)
+        rod = scene.add("rod", h.RigidBody(1., np.eye(3), position=(c, s, 0), rotation=h.rotation((0, 0, 1), angle), angular_velocity=(0, 0, speed), velocity=(-s * speed, c * speed, 0)))
+        scene.connect("pin", h.Revolute, rod, scene.ground, (0, 0, 0))
+        return scene, rod
+
+    def test_pendulum(self):
+        for angle, speed in ((0.5, 2.), (0.5, 0.), (0., 2.)):  # in swing, where it turns back, at the bottom
+            scene, rod = self.pendulum(angle, speed)
+            told = self.warned(scene, rod)
+            self.assertEqual(len(told), 2)
+            self.assertRegex(told[0], "neither in equilibrium nor steady.*body rod.*state_space.*Run.equilibrium")
+        self.assertEqual(self.warned(scene, rod, omega=1e4), [])
+        self.assertEqual(self.warned(scene, rod, omega=[0., 3.], run=scene.run().equilibrium()), [])
+        self.assertEqual(self.warned(*self.pendulum(0., 0.)), [])
+        small = self.pendulum()[0].run().linearize()
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            small.modes()
+            small.state_space([], [])
+        with self.assertWarnsRegex(RuntimeWarning, r"modes\(count\): the state"):
+            small.modes(1)
+
+    def test_steady(self):
+        """A round rotor from space, a mast on a hub from the hub, and free fall"""
+        scene = h.Scene(gravity=(0, 0, -9.81))
+        rotor = scene.add("rotor", h.RigidBody(1., [1, 1, 2.], angular_velocity=(0, 0, 100.)))
+        post = scene.ground.marker()
+        scene.add("bearing", h.Bushing(rotor.marker(), post, stiffness=[1e3] * 3, force=(0, 0, 9.81)))
+        self.assertEqual(self.warned(scene, rotor), [])
+        scene = h.Scene()
+        hub = scene.add("hub", h.RigidBody(1., np.eye(3), angular_velocity=(0, 0, 5.)))
+        mast = scene.add("mast", h.RigidBody(1., np.eye(3), position=(1., 0, 0), velocity=(0, 5., 0), angular_velocity=(0, 0, 5.)))
+        scene.connect("pin", h.Revolute, hub, scene.ground, (0, 0, 0))
+        scene.connect("hinge", h.Revolute, mast, hub, (0.5, 0, 0))
+        self.assertEqual(self.warned(scene, mast, axes=hub), [])
+        self.assertEqual(len(self.warned(scene, mast)), 2)
+        scene = h.Scene(gravity=(0, 0, -9.81))
+        self.assertEqual(self.warned(scene, scene.add("stone", h.PointMass(position=(1., 0, 0)))), [])
 
 
 class Interrupted(unittest.TestCase):

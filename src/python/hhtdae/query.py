@@ -1,5 +1,6 @@
 """Snapshots of a run, and small motions about its state."""
 
+import warnings
 from dataclasses import dataclass
 from typing import Tuple
 
@@ -8,7 +9,7 @@ import numpy as np
 from . import _core
 from .expressions import _expression
 from .measures import Measure
-from .spec import check_parameters, number
+from .spec import check_parameters, number, plain
 from .threads import one_thread
 from .tracing import compile_tape, ordered
 
@@ -199,13 +200,60 @@ class Linearization:
     speed is steady as seen from space. Modes in axes of a round rotor are those in space, faster or slower by its speed.
 
     A swinging rod is steady from nowhere. There `modes()` without a count and `state_space()` are of the rates that small motions have at this moment, how
-    constraints change along the motion included; `response()` and `modes(count)`, which are sparse, are of equilibria and steady motions.
+    constraints change along the motion included; `response()` and `modes(count)`, which are sparse, are of equilibria and steady motions. They warn where accelerations
+    change the state within a period of the slowest motion that is asked for; a rotor that is not round has to be looked at from itself, which no warning tells.
     """
 
     @one_thread
     def __init__(self, run, time=None, axes=None):
         self._core = _core.Linearization()
-        self._core.take(run._open(), None if time is None else number(time, "time"), axes)
+        ts = run._open()
+        self._core.take(ts, None if time is None else number(time, "time"), axes)
+        self._scene, self._axes = run.scene, axes
+        self._time, self._steps = run._at(time), ts.getStepNumber()
+        self._changes = None  # see _unsteadiness()
+
+    def _unsteadiness(self):
+        """The body that changes its velocity or angular velocity most, as seen from the axes, relative to the distances of bodies; by how much (1/s^2), and the square of a rate at which
+        the scene moves by itself. In a steady motion velocities are constant vectors of the axes, a = W x v for axes that turn with W. Nothing if the run has gone on since then."""
+        from .scene import Body
+
+        ts = self._core.ts
+        bodies = [Body(self._scene, (k, self._scene.ground._number), name) for k, name, _ in self._scene._moving]
+        if not bodies or ts.getStepNumber() != self._steps:
+            return "", 0., 0.
+        now = _core.Snapshot()
+        now.take(ts, self._time)
+        motion = [now.body(b) for b in bodies]
+        x, v, a, w, turn = (np.array([m[name] for m in motion]) for name in ("position", "velocity", "acceleration", "angular_velocity", "angular_acceleration"))
+        W, gravity = self._spin(now, w), np.array(plain(self._scene._gravity), dtype=float)
+        a, turn = a - np.cross(W, v), turn - np.cross(W, w)
+        if abs(a - gravity).max() <= 1e-9 * abs(gravity).max():  # free fall
+            a[:] = 0
+        size = max(np.ptp(x, axis=0).max(), abs(x).max()) or np.inf
+        change = np.linalg.norm(turn, axis=1) + np.linalg.norm(a, axis=1) / size
+        rate = (w**2).sum(axis=1).max() + (v**2).sum(axis=1).max() / size**2 + np.linalg.norm(gravity) / size
+        return bodies[change.argmax()].name, change.max(), rate
+
+    def _spin(self, now, w):
+        """Angular velocity of the axes, see linearize.h; w: of the bodies"""
+        if self._axes is not None:
+            return now.body(self._axes)["angular_velocity"] if self._axes._id >= 0 else np.zeros(3)
+        w = w[[flexible for _, _, flexible in self._scene._moving]]
+        alike = len(w) and np.linalg.norm(w - w[0], axis=1).max() <= 1e-2 * np.linalg.norm(w, axis=1).max()
+        return w.mean(axis=0) if alike else np.zeros(3)
+
+    def _warn_if_unsteady(self, call, rates):
+        """What is sparse has constraints as they are at this moment; rates: of the motions that are asked for, 1/s"""
+        if self._changes is None:
+            self._changes = self._unsteadiness()
+        body, change, own = self._changes
+        square = max(min((abs(x)**2 for x in rates), default=0.), 1e-4 * own)
+        if square and change > 1e-3 * square:
+            warnings.warn("%s: the state at t = %g is neither in equilibrium nor steady as seen from the axes of the linearization, and small motions are others: accelerations move body %s by "
+                          "%.2g of the scene's size, or turn it by as many radians, within 1 rad of a motion of %.3g rad per unit of time. Take state_space() or modes() without a count, "
+                          "which are of any state; or bring the run to equilibrium by Run.equilibrium(); or name the body from which the motion is steady, linearize(axes=)"
+                          % (call, self._time, body, change / square, square**0.5), RuntimeWarning, 3)
 
     def modes(self, count=None, shift=1.):
         """Natural modes, a list of `Mode` by increasing abs(value): all by dense algebra, for scenes of up to 1000 unknowns; or the `count` slowest by
@@ -214,7 +262,9 @@ class Linearization:
             return self._core.modes()
         from . import flexible
 
-        return flexible._flexible.slowest_modes(self._core, count, shift)
+        found = flexible._flexible.slowest_modes(self._core, count, shift)
+        self._warn_if_unsteady("modes(count)", [mode.value for mode in found])
+        return found
 
     def part(self, mode, body):
         """`BodyPart` of a body in a mode."""
@@ -226,7 +276,10 @@ class Linearization:
 
     def response(self, excitation, measure, omega):
         """Complex amplitudes of a measure where the input is cos(omega t), for each circular frequency of `omega` (rad per unit of time)."""
-        return self._core.response(_excitation(excitation), _measure(measure), np.atleast_1d(np.asarray(omega, dtype=float)))
+        omega = np.atleast_1d(np.asarray(omega, dtype=float))
+        found = self._core.response(_excitation(excitation), _measure(measure), omega)
+        self._warn_if_unsteady("response()", omega)
+        return found
 
     def state_space(self, inputs, outputs):
         """`StateSpace` in minimal coordinates between lists of excitations and measures."""
