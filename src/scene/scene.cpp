@@ -71,6 +71,20 @@ Body Scene::add(const std::string &name, const PointMass &b)
   return body;
 }
 
+/* What is wrong with a marker's position and axes, or nothing */
+static std::string FaultOfPlace(const Vector3 &position, const Matrix3 &axes)
+{
+  constexpr double tolerance = 1e-8; /* rounding of axes that were computed, or written with eight digits */
+  const auto       list      = [](const Vector3 &x) { return "(" + Show(x(0)) + ", " + Show(x(1)) + ", " + Show(x(2)) + ")"; };
+  if (!position.allFinite()) return "its position is " + list(position) + ", must be finite";
+  if (!axes.allFinite()) return "its axes are not finite";
+  const Matrix3 products = axes.transpose() * axes;
+  if ((products - Matrix3::Identity()).norm() > tolerance)
+    return "its axes are not orthonormal: the columns' lengths are " + list(products.diagonal().cwiseSqrt()) + ", their scalar products " +
+           list({products(0, 1), products(1, 2), products(2, 0)}) + ", which must be 1 and 0";
+  return axes.determinant() < 0 ? "its axes are left-handed: turn one of them round" : "";
+}
+
 Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, const std::string &name)
 {
   if (recording()) record([=](Scene &s) { s.marker(body, position, axes, name); });
@@ -82,8 +96,8 @@ Marker Scene::marker(Body body, const Vector3 &position, const Matrix3 &axes, co
   else if (body.id >= 0 && s.bodies[body.id].flexible)
     s.errors.push_back(who + ": a flexible body is held at its attachments and kept nodes; use scene.attachment(" + s.bodies[body.id].name +
                        ", ...) or scene.node(...) as the marker's body");
-  if (!position.allFinite() || !axes.allFinite() || (axes.transpose() * axes - Matrix3::Identity()).norm() > 1e-8 || axes.determinant() < 0)
-    s.errors.push_back(who + ": position must be finite and axes orthonormal and right-handed");
+  const std::string fault = FaultOfPlace(position, axes);
+  if (!fault.empty()) s.errors.push_back(who + (good ? " on " + s.bodyName(body.id) : "") + ": " + fault);
   MarkerData m{good ? body.id : -2, position, axes};
   if (good && body.id >= 0) {
     m.s -= s.bodies[body.id].center;

@@ -924,6 +924,35 @@ class Mistakes(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "time between samples"):
             scene.run(sample=-1)
 
+    def test_things_of_another_kind(self):
+        """What is asked for is told where a text, a function or a single thing is given in place of it"""
+        scene, rod, pin = pendulum()
+        m, w = rod.marker(), h.displacement(rod.marker(), "x")
+        push, count = h.Excitation.force(m, (1, 0, 0)), scene._elements
+        small = scene.run().linearize()
+        other, b, _ = pendulum()
+        for call, error, words in ((lambda: b.shape("box"), TypeError, r"a shape of rod is 'box', must be Shape.box"),
+                                   (lambda: other.connect("q", h.Revolute, b, other.ground, (0, 0, 0), axis="z"), ValueError, r"connect\(\): axis must be a direction, .*not 'z'"),
+                                   (lambda: other.add("q", h.UserForce(b.marker(), force=lambda t: [t, 0, 0])), TypeError, "UserForce q: force: must be a list of formulas, .*function"),
+                                   (lambda: other.add("q", h.UserForce(b.marker(), moment=h.time())), TypeError, "UserForce q: moment: must be a list of formulas"),
+                                   (lambda: small.state_space(push, [w]), TypeError, "inputs is Excitation.*must be a list"),
+                                   (lambda: small.state_space([push], w), TypeError, "outputs is .*must be a list"),
+                                   (lambda: small.modes(1.5), TypeError, "count is 1.5, must be a whole number"),
+                                   (lambda: small.modes(2, "a"), TypeError, "shift is 'a', must be a number"),
+                                   (lambda: small.modes(3), h.Error, "the scene has 1 degree of freedom")):
+            with self.assertRaisesRegex(error, words):
+                call()
+        self.assertEqual(other._elements, count)
+
+    def test_markers_that_cannot_be(self):
+        """The error names the body, and which condition is not met"""
+        for position, axes, words in (((0, np.nan, 0), None, r"position is \(0, nan, 0\), must be finite"), ((0, 0, 0), 3 * np.eye(3), r"axes are not orthonormal: the columns' lengths are \(3, 3, 3\)"),
+                                      ((0, 0, 0), np.diag([1, 1, -1]), "axes are left-handed"), ((0, 0, 0), np.full((3, 3), np.inf), "axes are not finite")):
+            scene, rod, pin = pendulum()
+            rod.marker(position, axes)
+            with self.assertRaisesRegex(h.Error, "marker 2 on rod: its " + words):
+                scene.set_up()
+
     def test_exceptions_of_callbacks(self):
         scene = h.Scene()
         b = scene.add("b", h.PointMass())

@@ -155,11 +155,14 @@ class Shape:
 
 def _direction(x, of):
     """x as a unit vector."""
-    x = np.asarray(x, dtype=float)
-    length = np.linalg.norm(x)
-    if not (x.shape == (3,) and 0 < length < np.inf):
-        raise ValueError(f"{of} must be a direction, three numbers that are not all zero, not {x.tolist()}")
-    return x / length
+    try:
+        d = np.asarray(x, dtype=float)
+        length = np.linalg.norm(d)
+    except ValueError:  # a text, say
+        length = 0.
+    if not (0 < length < np.inf and d.shape == (3,)):
+        raise ValueError(f"{of} must be a direction, three numbers that are not all zero, not {x.tolist() if isinstance(x, np.ndarray) else x!r}")
+    return d / length
 
 
 def axes_along(z, x=None):

@@ -7,6 +7,7 @@ from typing import Tuple
 import numpy as np
 
 from . import _core
+from ._errors import Error
 from .expressions import _expression
 from .measures import Measure
 from .spec import check_parameters, number, plain
@@ -262,9 +263,23 @@ class Linearization:
             return self._core.modes()
         from . import flexible
 
-        found = flexible._flexible.slowest_modes(self._core, count, shift)
+        if isinstance(count, (bool, np.bool_)) or not hasattr(count, "__index__"):
+            raise TypeError("modes(): count is %r, must be a whole number, or None for all modes" % (count,))
+        try:
+            found = flexible._flexible.slowest_modes(self._core, int(count), number(shift, "modes(): shift"))
+        except Error as error:
+            freedoms = self._freedoms()
+            if count <= freedoms:
+                raise
+            text = "modes(%d): the scene has %d degree%s of freedom, and no more modes where nothing is overdamped; ask for fewer, or for all by modes()" % (count, freedoms, "s" * (freedoms != 1))
+            raise Error(error.ierr, text + ". " + error.message, error.trace) from error.__cause__
         self._warn_if_unsteady("modes(count)", [mode.value for mode in found])
         return found
+
+    def _freedoms(self):
+        """Coordinates less constraints"""
+        size = {role: rows.getSize() if rows else 0 for role in ("coordinate", "holonomic", "nonholonomic") for rows in [_core.get_is(self._core.ts, role)]}
+        return size["coordinate"] - size["holonomic"] - size["nonholonomic"]
 
     def part(self, mode, body):
         """`BodyPart` of a body in a mode."""
@@ -283,6 +298,9 @@ class Linearization:
 
     def state_space(self, inputs, outputs):
         """`StateSpace` in minimal coordinates between lists of excitations and measures."""
+        for name, given, example in (("inputs", inputs, "[Excitation.force(marker, vector)]"), ("outputs", outputs, '[hhtdae.displacement(marker, "x")]')):
+            if isinstance(given, (Excitation, Measure, str)) or not np.iterable(given):
+                raise TypeError("state_space(): %s is %r, must be a list, as %s" % (name, given, example))
         return StateSpace(*self._core.state_space([_excitation(e) for e in inputs], [_measure(m) for m in outputs]))
 
     def operators(self):

@@ -9,7 +9,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from . import _core
-from .bodies import FlexibleBody, PointMass, RigidBody, Shape, axes_along
+from .bodies import FlexibleBody, PointMass, RigidBody, Shape, _direction, axes_along
 from .elements import ELEMENTS
 from .expressions import Expression, Parameter, describing
 from .joints import RotationalMotion, TranslationalMotion, UserConstraint
@@ -70,6 +70,8 @@ class Body(_Handle):
 
     def shape(self, shape: Shape) -> "Body":
         """Draws the body in animations and pages."""
+        if not isinstance(shape, Shape):
+            raise TypeError("a shape of %s is %r, must be Shape.box(half), Shape.cylinder(radius, length) or Shape.sphere(radius)" % (self.name, shape))
         self._scene._describe("a shape of %s" % self.name)
         self._scene._core.shape(self, shape.kind, shape.size, shape.position, shape.axes, shape._rgb())
         return self
@@ -330,6 +332,7 @@ class Scene:
 
         >>> scene.connect("pin", hhtdae.Revolute, arm, scene.ground, (0, 0, 0), axis=(0, 0, 1))
         """
+        _direction(axis, "Scene.connect(): axis")
         axes = axes_along(axis)
         return self.add(name, joint(i.marker_at(point, axes), j.marker_at(point, axes), **fields))
 

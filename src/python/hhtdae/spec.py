@@ -151,6 +151,8 @@ class Spec:
 
 
 def _expressions(many, keep):
+    if isinstance(many, (Expression, str)) or callable(many) or not np.iterable(many):
+        raise TypeError("must be a list of formulas, as [0, 0, hhtdae.sin(hhtdae.time())], is %r" % (many,))
     return [description(x, keep) for x in many]
 
 
