@@ -1,4 +1,4 @@
-"""Runs of one scene that begin in different ways: each is what it would be alone; states that are not steady; descriptions that are interrupted."""
+"""Runs of one scene that begin in different ways: each is what it would be alone; derivatives by parameters; states that are not steady; descriptions that are interrupted."""
 
 import unittest
 import unittest.mock
@@ -70,6 +70,34 @@ class Starts(unittest.TestCase):
         self.assertAlmostEqual(solve(scene)["z"][-1], -500., delta=1e-3)
         scene.start(equilibrium=False)
         np.testing.assert_array_equal(solve(scene).values, runs[0].values)
+
+
+class Derivatives(unittest.TestCase):
+    """By a parameter, as differences of results of runs: src/python/README.md"""
+
+    def test_differences(self):
+        scene, last = h.Scene(gravity=(0, 0, -9.81)), None
+        k = scene.parameter("k", 100.)
+        for n in range(2):
+            last, before = scene.add("rod %d" % n, h.RigidBody(1., np.diag([0.1, 0.1, 0.01]), position=(n + 0.5, 0, 0))), last or scene.ground
+            scene.connect("pin %d" % n, h.Revolute, last, before, (n, 0, 0), axis=(0, 1, 0))
+        tip = last.marker((0.5, 0, 0))
+        scene.add("spring", h.SpringDamper(tip, scene.ground.marker((1, 0, 1)), stiffness=k, damping=1.))
+        height = h.displacement(tip, "z")
+
+        def slope(c, step, **how):
+            z = []
+            for stiffness in (c * (1 + step), c):
+                scene.set(k=stiffness)
+                z.append(scene.solve(1., sample=None, **how).snapshot().value(height))
+            return (z[0] - z[1]) / (c * step)
+
+        values = np.linspace(100., 105., 3)
+        exact = [(slope(c, 1e-3, tolerance=1e-9) + slope(c, -1e-3, tolerance=1e-9)) / 2 for c in values]
+        fixed = {"ts_adapt_type": "none", "ts_dt": 1e-3, "ts_hhtdae_corrector_tolerance": 1e-5}
+        for step, how, largest in ((1e-2, dict(tolerance=1e-7), 0.06), (1e-4, dict(tolerance=1e-7), 0.03), (1e-2, dict(options=fixed), 0.06), (1e-6, dict(options=fixed), 0.01)):
+            for c, x in zip(values, exact):
+                self.assertLess(abs(slope(c, step, **how) / x - 1), largest)
 
 
 class Steady(unittest.TestCase):
