@@ -11,6 +11,8 @@
 #include "functions.h"
 #include <functional>
 #include <map>
+#include <memory>
+#include <optional>
 
 namespace hhtdae
 {
@@ -123,17 +125,29 @@ template <class Spec> Spec Read(const py::dict &fields, const std::string &kind,
   return s;
 }
 
+/* A description that has been called, whose result is that of its first call: an exception of it comes before the scene has noted a part that is not there */
+template <class F> auto Called(F describe)
+{
+  auto first = std::make_shared<std::optional<decltype(describe())>>(describe());
+  return [describe, first] {
+    if (!*first) return describe();
+    auto x = std::move(**first);
+    first->reset();
+    return x;
+  };
+}
+
 template <class Spec> void Register(Kinds &kinds, const std::string &kind)
 {
   kinds[kind] = {
     [kind](Scene &scene, const std::string &name, const py::dict &fields) { return scene.add(name, Read<Spec>(fields, kind, name)); },
     [kind](Scene &scene, const std::string &name, py::handle describe) {
-      return scene.add(name, [kind, name, describe]() -> std::optional<Spec> {
+      return scene.add(name, Called([kind, name, describe]() -> std::optional<Spec> {
         py::gil_scoped_acquire gil;
         const py::object fields = Call(describe, py::tuple());
         if (fields.is_none()) return {};
         return Read<Spec>(py::dict(fields), kind, name);
-      });
+      }));
     },
     [] {
       Spec   s{};

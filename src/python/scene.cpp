@@ -83,10 +83,10 @@ FlexibleBody ToFlexible(const py::dict &d, const std::string &name)
 template <class Spec> Body AddBody(Scene &s, const std::string &name, py::object given, Spec (*read)(const py::dict &, const std::string &))
 {
   if (py::isinstance<py::dict>(given)) return s.add(name, read(py::dict(given), name));
-  return s.add(name, [name, read, f = py::handle(given)] {
+  return s.add(name, Called([name, read, f = py::handle(given)] {
     py::gil_scoped_acquire gil;
     return read(py::dict(Call(f, py::tuple())), name);
-  });
+  }));
 }
 
 /* A place: position and axes, now or whenever parameters have changed */
@@ -102,20 +102,20 @@ Marker AddMarker(Scene &s, py::object body, py::object place, const std::string 
     const Place p = ToPlace(place);
     return at ? s.markerAt(b, p.position, p.axes, name) : s.marker(b, p.position, p.axes, name);
   }
-  const auto describe = [f = py::handle(place)] {
+  const auto describe = Called([f = py::handle(place)] {
     py::gil_scoped_acquire gil;
     return ToPlace(Call(f, py::tuple()));
-  };
+  });
   return at ? s.markerAt(b, describe, name) : s.marker(b, describe, name);
 }
 
 void SetGravity(Scene &s, py::object g)
 {
   if (!PyCallable_Check(g.ptr())) return s.gravity(ToVector(g, "gravity"));
-  s.gravity([f = py::handle(g)] {
+  s.gravity(Called([f = py::handle(g)] {
     py::gil_scoped_acquire gil;
     return ToVector(Call(f, py::tuple()), "gravity");
-  });
+  }));
 }
 
 py::object NewRun(Scene &s, py::object from)

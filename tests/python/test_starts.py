@@ -172,6 +172,24 @@ class Interrupted(unittest.TestCase):
             scene.set_up()
         self.assertIsNone(caught.exception.__cause__)
 
+    def test_descriptions_that_are_repeated(self):
+        """What was interrupted is not there, and may be described again"""
+        scene = h.Scene()
+        k = scene.parameter("k", 2.)
+        with unittest.mock.patch("hhtdae.spec.plain", side_effect=KeyboardInterrupt), self.assertRaises(KeyboardInterrupt):
+            scene.add("b", h.PointMass(mass=k))
+        body = scene.add("b", h.PointMass(mass=k))
+        with unittest.mock.patch("hhtdae.scene.plain", side_effect=KeyboardInterrupt), self.assertRaises(KeyboardInterrupt):
+            scene.ground.marker((k, 0, 0))
+        end, there = scene.ground.marker((k, 0, 0)), body.marker()
+        with unittest.mock.patch("hhtdae.spec.plain", side_effect=KeyboardInterrupt), self.assertRaises(KeyboardInterrupt):
+            scene.add("spring", h.SpringDamper(there, end, stiffness=k))
+        scene.add("spring", h.SpringDamper(there, end, stiffness=k, length=1.))
+        scene.channel("x", h.displacement(there, "x"))
+        for value in (2., 3., 2.):
+            scene.set(k=value)
+            self.assertAlmostEqual(scene.solve(1., tolerance=1e-7)["x"][-1], (value - 1) * (1 - np.cos(1.)), delta=1e-4)
+
 
 if __name__ == "__main__":
     unittest.main()
