@@ -128,12 +128,12 @@ template <class Spec> Spec Read(const py::dict &fields, const std::string &kind,
 /* A description that has been called, whose result is that of its first call: an exception of it comes before the scene has noted a part that is not there */
 template <class F> auto Called(F describe)
 {
-  auto first = std::make_shared<std::optional<decltype(describe())>>(describe());
-  return [describe, first] {
+  using Part = decltype(describe());
+  auto first = std::make_shared<std::unique_ptr<Part>>(std::make_unique<Part>(describe()));
+  return [describe, first]() -> Part {
     if (!*first) return describe();
-    auto x = std::move(**first);
-    first->reset();
-    return x;
+    const std::unique_ptr<Part> x = std::move(*first);
+    return *x;
   };
 }
 
