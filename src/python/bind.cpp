@@ -71,9 +71,11 @@ py::object FromIS(IS x) { Petsc4Py(); return New<IS>(x, PyPetscIS_New); }
 
 Array ToArray(py::handle x, const std::string &what)
 {
-  Array a = Array::ensure(x);
-  if (a) return a;
-  PyErr_Clear();
+  try {
+    return Array(py::reinterpret_borrow<py::object>(x));
+  } catch (py::error_already_set &e) {
+    if (!e.matches(PyExc_TypeError) && !e.matches(PyExc_ValueError)) throw; /* Ctrl-C comes while NumPy reads a list, too */
+  }
   throw py::type_error(what + " must be numbers, is " + py::repr(x).cast<std::string>());
 }
 
@@ -103,10 +105,8 @@ Eigen::VectorXd ToEigen(py::handle x, const std::string &what)
 
 py::array FromDoubles(const double *x, std::vector<py::ssize_t> shape) { return py::array_t<double>(std::move(shape), x); }
 
-py::object Call(py::handle f, const py::tuple &arguments)
+void Keep()
 {
-  PyObject *result = PyObject_CallObject(f.ptr(), arguments.ptr());
-  if (result) return py::reinterpret_steal<py::object>(result);
   PyObject *type, *value, *trace;
   PyErr_Fetch(&type, &value, &trace);
   PyErr_NormalizeException(&type, &value, &trace);
@@ -116,6 +116,13 @@ py::object Call(py::handle f, const py::tuple &arguments)
   Py_XDECREF(trace);
   Py_XSETREF(pending_, value);
   throw std::runtime_error(text);
+}
+
+py::object Call(py::handle f, const py::tuple &arguments)
+{
+  PyObject *result = PyObject_CallObject(f.ptr(), arguments.ptr());
+  if (!result) Keep();
+  return py::reinterpret_steal<py::object>(result);
 }
 
 void PassOn()

@@ -57,6 +57,18 @@ inline py::array FromVector(const Vector3 &x) { return FromDoubles(x.data(), {3}
 /* Calls a Python function from inside of PETSc: an exception is kept for Check(), which makes it the cause of hhtdae.Error, and goes
    on as a std::runtime_error with its text. */
 py::object Call(py::handle f, const py::tuple &arguments);
+/* Keeps Python's present exception like Call() */
+[[noreturn]] void Keep();
+/* What C++ calls back by more than Call(): exceptions of conversions are kept, too */
+template <class F> auto Keeping(F f) -> decltype(f())
+{
+  try {
+    return f();
+  } catch (py::error_already_set &e) {
+    e.restore();
+  }
+  Keep();
+}
 /* Raises the exception that Call() has kept, if there is one */
 void PassOn();
 /* What Python calls without PETSc between: an exception of a function within goes on as it is */

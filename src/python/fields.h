@@ -126,9 +126,13 @@ template <class Spec> Spec Read(const py::dict &fields, const std::string &kind,
 }
 
 /* A description that has been called, whose result is that of its first call: an exception of it comes before the scene has noted a part that is not there */
-template <class F> auto Called(F describe)
+template <class F> auto Called(F read)
 {
-  using Part = decltype(describe());
+  using Part          = decltype(read());
+  const auto describe = [read] {
+    py::gil_scoped_acquire gil;
+    return Keeping(read);
+  };
   auto first = std::make_shared<std::unique_ptr<Part>>(std::make_unique<Part>(describe()));
   return [describe, first]() -> Part {
     if (!*first) return describe();
@@ -143,7 +147,6 @@ template <class Spec> void Register(Kinds &kinds, const std::string &kind)
     [kind](Scene &scene, const std::string &name, const py::dict &fields) { return scene.add(name, Read<Spec>(fields, kind, name)); },
     [kind](Scene &scene, const std::string &name, py::handle describe) {
       return scene.add(name, Called([kind, name, describe]() -> std::optional<Spec> {
-        py::gil_scoped_acquire gil;
         const py::object fields = Call(describe, py::tuple());
         if (fields.is_none()) return {};
         return Read<Spec>(py::dict(fields), kind, name);

@@ -84,7 +84,6 @@ template <class Spec> Body AddBody(Scene &s, const std::string &name, py::object
 {
   if (py::isinstance<py::dict>(given)) return s.add(name, read(py::dict(given), name));
   return s.add(name, Called([name, read, f = py::handle(given)] {
-    py::gil_scoped_acquire gil;
     return read(py::dict(Call(f, py::tuple())), name);
   }));
 }
@@ -103,7 +102,6 @@ Marker AddMarker(Scene &s, py::object body, py::object place, const std::string 
     return at ? s.markerAt(b, p.position, p.axes, name) : s.marker(b, p.position, p.axes, name);
   }
   const auto describe = Called([f = py::handle(place)] {
-    py::gil_scoped_acquire gil;
     return ToPlace(Call(f, py::tuple()));
   });
   return at ? s.markerAt(b, describe, name) : s.marker(b, describe, name);
@@ -113,7 +111,6 @@ void SetGravity(Scene &s, py::object g)
 {
   if (!PyCallable_Check(g.ptr())) return s.gravity(ToVector(g, "gravity"));
   s.gravity(Called([f = py::handle(g)] {
-    py::gil_scoped_acquire gil;
     return ToVector(Call(f, py::tuple()), "gravity");
   }));
 }

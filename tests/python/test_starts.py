@@ -168,6 +168,14 @@ class Interrupted(unittest.TestCase):
             for part in (h.PointMass(mass=k), h.RigidBody(mass=k), h.SpringDamper(marker, scene.ground.marker(), stiffness=k)):
                 with unittest.mock.patch("hhtdae.spec.plain", side_effect=error), self.assertRaises(error):
                     scene.add("", part)
+        class Slow:
+            def __array__(self, *args, **named):
+                raise KeyboardInterrupt
+
+        with unittest.mock.patch("hhtdae.scene.plain", return_value=Slow()), self.assertRaises(KeyboardInterrupt):
+            body.marker((k, 0, 0))  # while NumPy reads the numbers
+        with self.assertRaises(KeyboardInterrupt):
+            body.marker(Slow())
         with self.assertRaisesRegex(h.Error, "mass is -1") as caught:
             scene.set_up()
         self.assertIsNone(caught.exception.__cause__)
