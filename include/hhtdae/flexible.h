@@ -240,7 +240,7 @@ struct FullBody {
   forces and markers; each node tied rigidly costs three multipliers, an average six for all its nodes. The model must outlive the
   scene. Collective; call it on all ranks in the same order as the scene's other parts. A page of the run (-scene_page) shows the surface of its
   mesh, coloured by stress where elements have materials. With FeLaw::Large model.K and model.M are not read after add(): MatDestroy() gives
-  1.9 kB an unknown back, unless the scene is described anew later (parameters) or the model put into another one.
+  1.9 kB an unknown back, unless the scene is described anew later (parameters, another start) or the model put into another one.
 */
 class FullFeBody
 {

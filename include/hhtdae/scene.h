@@ -253,8 +253,8 @@ public:
   StartPolicy &start() { return start_; }
 
   /* Checks the scene, assembles it, drops redundant constraints, numbers it, looks for static equilibrium, all as start() says;
-     collective; called by createTS() when it has not been. After this the scene is fixed, but for its parameters: what is added
-     later, markers apart, is an error of the next createTS(), solve() or sample(). */
+     collective; called by createTS() when it has not been, and where parameters, start() or options of the start have changed since. After this the
+     scene is fixed but for these: what is added later, markers apart, is an error of the next createTS(), solve() or sample(). */
   PetscErrorCode setUp();
 
   /* A run from the start: a TS of type TSHHT3 with the scene's residual, Jacobian, roles and initial state; the caller destroys it.
@@ -281,7 +281,7 @@ public:
 
 private:
   friend struct SceneAccess; /* for the library's own rooms and for tests */
-  struct Journal; /* what was described, call by call; only where there are parameters */
+  struct Journal; /* what was described, call by call */
   struct Nested {  /* what is called inside of another call is not noted */
     Scene &scene;
     explicit Nested(Scene &s) : scene(s) { scene.nested_++; }

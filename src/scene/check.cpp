@@ -188,7 +188,7 @@ bool SameStart(const StartPolicy &a, const StartPolicy &b)
 }
 
 /* An error if anything was added since setUp(). How runs start may have changed: setUp() then describes the scene anew. */
-PetscErrorCode CheckUnchanged(const SceneData &s, const StartPolicy &)
+PetscErrorCode CheckUnchanged(const SceneData &s)
 {
   PetscFunctionBegin;
   PetscCall(Report(s, s.errors, "the scene was changed after it was set up"));

@@ -171,7 +171,7 @@ PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
   Runtime  *R = RunOf(ts);
   PetscReal t, end, atol, rtol;
   PetscFunctionBegin;
-  PetscCall(CheckUnchanged(R->scene, R->scene.start_given)); /* elements added after the set-up have no unknowns */
+  PetscCall(CheckUnchanged(R->scene)); /* elements added after the set-up have no unknowns */
   PetscCall(CreateRun(R->model, copy));
   PetscCall(CopyState(*R, ts, *RunOf(*copy), *copy));
   PetscCall(TSGetTime(ts, &t));

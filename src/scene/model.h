@@ -56,7 +56,7 @@ std::string UnknownName(const Model &M, PetscInt row);
 PetscMPIInt OwnerOf(const Model &M, const Expression &e);
 /* check.cpp: one error with everything that is wrong with the description */
 PetscErrorCode CheckDescription(SceneData &s);
-PetscErrorCode CheckUnchanged(const SceneData &s, const StartPolicy &start);
+PetscErrorCode CheckUnchanged(const SceneData &s);
 
 } // namespace hhtdae
 

@@ -324,7 +324,6 @@ PetscErrorCode Scene::setUp()
     PetscCall(Number(M));
     if (s.start.equilibrium && !M.continues) PetscCall(FindEquilibrium(model_));
     if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
-    s.start_given = start_;
     s.markers_then = s.markers.size();
     s.fixed = M.compiled = true; /* only at the end: after an error setUp() begins again */
     PetscFunctionReturn(0);

@@ -151,7 +151,6 @@ struct SceneData {
   std::vector<ParameterData>  parameters;
   std::vector<std::string>    errors; /* found while the scene was described */
   StartPolicy                                           start;  /* with options */
-  StartPolicy                                           start_given; /* without */
   StartResult                 started;
   bool                                                  fixed        = false; /* from setUp() on nothing may be added but markers for queries */
   std::size_t                                           markers_then = 0;     /* number of markers at that time */

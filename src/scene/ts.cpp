@@ -187,7 +187,7 @@ PetscErrorCode Scene::createTS(TS *ts)
 {
   PetscFunctionBegin;
   PetscCall(setUp());
-  PetscCall(CheckUnchanged(data(), start_));
+  PetscCall(CheckUnchanged(data()));
   PetscCall(CreateRun(model_, ts));
   PetscCall(ExpectOutput(*ts, output_));
   if (model_->continues) PetscFunctionReturn(0); /* createTS(ts, from) projects the initial state */
