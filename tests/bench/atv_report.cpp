@@ -105,9 +105,9 @@ static std::vector<Planned> Sweep(AtvRuns runs, bool fine)
     std::vector<std::pair<double, double>> grid, fine;
   };
   const Foreign foreign[] = {
-      {"IDA, index 3", Form::Index3, {{1e-3, 0}, {1e-4, 0}, {1e-5, 0}, {1e-6, 0}}, {}},
+      {"IDA, index 3", Form::Index3, {{1e-3, 0}, {1e-4, 0}, {1e-5, 0}}, {{1e-6, 0}}},
       {"IDA, index 3, steps limited", Form::Index3, {{1e-4, 5e-4}}, {{1e-5, 5e-4}, {1e-5, 2e-4}, {1e-6, 1e-4}}},
-      {"IDA, stabilized index 2", Form::Stabilized, {{1e-3, 0}}, {{1e-4, 0}, {1e-5, 0}}}};
+      {"IDA, stabilized index 2", Form::Stabilized, {{1e-3, 0}, {1e-4, 0}}, {{1e-5, 0}}}};
   for (const Foreign &m : foreign)
     for (const auto &[eps, step] : gridOf(m))
       plan.push_back([=, e = eps, h = step](AtvRun *run) { return runs.ida(m.name, e, h, m.form, run); });
