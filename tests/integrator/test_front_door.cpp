@@ -127,4 +127,15 @@ TEST(FrontDoor, ASNESOfTheProgram)
   must(own.solve());
   must(given.solve());
   EXPECT_EQ(given.u(), own.u());
+  Simulation refused(p, tolerance(1e-5));
+  Vec        r;
+  must(SNESCreate(PETSC_COMM_SELF, &snes));
+  must(TSSetSNES(refused.ts, snes));
+  must(VecDuplicate(refused.U, &r));
+  must(SNESSetFunction(snes, r, [](SNES, Vec X, Vec F, void *) { return VecCopy(X, F); }, nullptr));
+  ErrorTrap trap;
+  EXPECT_EQ(refused.solve(), PETSC_ERR_SUP);
+  EXPECT_TRUE(trap.says("SNESSetFunction()")) << trap.message;
+  must(VecDestroy(&r));
+  must(SNESDestroy(&snes));
 }

@@ -49,6 +49,18 @@ PetscErrorCode SetUpDifferences(TS ts, DM dm, Mat P, PetscBool shell)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A SNES that came by TSSetSNES() has a DM that makes no vectors: it takes that of the TS. With a function of the program's own it keeps its DM, and is refused. */
+PetscErrorCode ShareDM(SNES snes, DM dm)
+{
+  DMSNES own;
+
+  PetscFunctionBegin;
+  if (!snes->dmAuto) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DMGetDMSNES(snes->dm, &own));
+  if (!own->ops->computefunction || own->ops->computefunction == SNESTSFormFunction) PetscCall(SNESSetDM(snes, dm)); /* FrontDoor.ASNESOfTheProgram */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace
 
 PetscErrorCode SetUpJacobian(TS ts)
@@ -63,7 +75,7 @@ PetscErrorCode SetUpJacobian(TS ts)
   PetscCall(TSGetSNES(ts, &snes));
   PetscCall(HooksTakeOver(ts, snes));
   PetscCall(TSGetDM(ts, &dm));
-  if (snes->dmAuto) PetscCall(SNESSetDM(snes, dm)); /* of a SNES that came by TSSetSNES(), whose own makes no vectors (FrontDoor.ASNESOfTheProgram) */
+  PetscCall(ShareDM(snes, dm));
   PetscCall(WhoFillsMatrix(dm, &has, &wanted, &pattern));
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
   PetscCall(PetscObjectTypeCompare((PetscObject)dm, DMSHELL, &shell));
