@@ -51,6 +51,8 @@ inline Matrix3 tube(double mass, double outer, double inner, double length)
   const double r2 = outer * outer + inner * inner, side = mass * (r2 / 4 + length * length / 12);
   return diagonal(side, side, mass * r2 / 2);
 }
+/* thin, along z, without a moment about it */
+inline Matrix3 rod(double mass, double length) { return tube(mass, 0, 0, length); }
 inline Matrix3 cylinder(double mass, double radius, double length) { return tube(mass, radius, 0, length); }
 inline Matrix3 disc(double mass, double radius) { return tube(mass, radius, 0, 0); }
 inline Matrix3 ellipsoid(double mass, const Vector3 &radii)

@@ -517,6 +517,26 @@ class Runs(unittest.TestCase):
         with self.assertRaisesRegex(h.Error, "there is no parameter wheel"):
             scene.set(wheel=1)
 
+    def test_parameters_in_moments_of_inertia(self):
+        """A bar of another length and mass is what it is when described with these numbers"""
+        def spin(scene, length, mass, **values):
+            bars = [h.RigidBody(mass=mass, inertia=h.inertia.about(h.inertia.box(mass, (length, 0.1, 0.2)), 0, (0, 0, 0)), position=(length / 2, 0, 0)),
+                    h.RigidBody(mass=2 * mass, inertia=h.inertia.ellipsoid(2 * mass, (0.1, length, 0.1)), position=(length, 0, 0))]
+            bar = scene.add("bar", h.composed(bars))
+            scene.connect("pin", h.Revolute, bar, scene.ground, (0, 0, 0))
+            scene.connect("handle", h.Spherical, scene.add("rod", h.RigidBody(mass, h.inertia.rod(mass, length) + np.diag([0, 0, 1e-3]), position=(length, 0, 0))), bar, (length, 0, 0))
+            scene.channel("spin", h.angular_velocity(bar.marker(), "z"))
+            return scene, scene.solve(0.7, tolerance=1e-5, **values)["spin"][-1]
+
+        scene = h.Scene(gravity=(0, -9.81, 0))
+        L, m = scene.parameter("L", 1.), scene.parameter("m", 2.)
+        scene, first = spin(scene, L, m)
+        self.assertEqual(first, spin(h.Scene(gravity=(0, -9.81, 0)), 1., 2.)[1])
+        scene.set(L=0.4, m=5)
+        other = scene.solve(0.7, tolerance=1e-5)["spin"][-1]
+        self.assertEqual(other, spin(h.Scene(gravity=(0, -9.81, 0)), 0.4, 5.)[1])
+        self.assertGreater(abs(other - first), 1)
+
     def test_states_variables_and_callbacks(self):
         """x' = -3 x with a variable y = x^2, and a force that pulls a mass by a Python function as by a formula"""
         finals = []

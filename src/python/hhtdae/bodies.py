@@ -178,6 +178,18 @@ def axes_along(z, x=None):
     return np.column_stack([p, np.cross(z, p), z])
 
 
+def _numbers(x):
+    """An array of floats, or of the formulas of parameters that x holds."""
+    a = np.asarray(x)
+    return a if a.dtype == object else np.asarray(x, dtype=float)
+
+
+def _matrix(J):
+    """Moments of inertia, of which the diagonal may have been given alone."""
+    J = _numbers(J)
+    return np.diag(J) if J.ndim == 1 else J
+
+
 def rotation(axis, angle):
     """The matrix of a rotation about an axis of any length, by an angle in radians."""
     a = _direction(axis, "rotation: the axis")
@@ -186,12 +198,13 @@ def rotation(axis, angle):
 
 
 class inertia:
-    """Moments of inertia of homogeneous bodies about their centre of mass, in their own axes: 3 x 3 matrices."""
+    """Moments of inertia of homogeneous bodies about their centre of mass, in their own axes: 3 x 3 matrices. Masses and lengths may be parameters of
+    a scene, and formulas of them."""
 
     @staticmethod
     def box(mass, edges):
         """Full edges along x, y, z."""
-        s = np.square(np.asarray(edges, dtype=float))
+        s = np.square(_numbers(edges))
         return mass / 12 * np.diag([s[1] + s[2], s[2] + s[0], s[0] + s[1]])
 
     @staticmethod
@@ -207,6 +220,11 @@ class inertia:
         return inertia.tube(mass, radius, 0., length)
 
     @staticmethod
+    def rod(mass, length):
+        """A thin rod along z. Its moment about z is zero, which a body in space must not have unless joints hold it there: `cylinder` has one."""
+        return inertia.tube(mass, 0., 0., length)
+
+    @staticmethod
     def disc(mass, radius):
         """A thin disc about z."""
         return inertia.tube(mass, radius, 0., 0.)
@@ -214,7 +232,7 @@ class inertia:
     @staticmethod
     def ellipsoid(mass, radii):
         """Radii along x, y, z."""
-        s = np.square(np.asarray(radii, dtype=float))
+        s = np.square(_numbers(radii))
         return mass / 5 * np.diag([s[1] + s[2], s[2] + s[0], s[0] + s[1]])
 
     @staticmethod
@@ -225,7 +243,7 @@ class inertia:
     @staticmethod
     def about(J, mass, d):
         """From the centre of mass to a point at d from it, Steiner's parallel axes."""
-        d = np.asarray(d, dtype=float)
+        d = _numbers(d)
         return np.asarray(J) + mass * (d.dot(d) * np.eye(3) - np.outer(d, d))
 
     @staticmethod
@@ -236,9 +254,9 @@ class inertia:
 
 def composed(parts):
     """A `RigidBody` of several, in the axes in which their positions and rotations are given, its origin there."""
-    fields = [p._fields({}) for p in parts]
-    mass = sum(f["mass"] for f in fields)
-    centers = [np.asarray(f["position"]) + np.asarray(f["rotation"]) @ np.asarray(f["center"]) for f in fields]
-    center = sum(f["mass"] * c for f, c in zip(fields, centers)) / mass
-    J = sum(inertia.about(inertia.turned(f["inertia"], f["rotation"]), f["mass"], c - center) for f, c in zip(fields, centers))
+    parts = list(parts)
+    mass = sum(p.mass for p in parts)
+    centers = [_numbers(p.position) + _numbers(p.rotation) @ _numbers(p.center) for p in parts]
+    center = sum(p.mass * c for p, c in zip(parts, centers)) / mass
+    J = sum(inertia.about(inertia.turned(_matrix(p.inertia), _numbers(p.rotation)), p.mass, c - center) for p, c in zip(parts, centers))
     return RigidBody(mass=mass, inertia=J, center=center)
