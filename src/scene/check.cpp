@@ -170,6 +170,13 @@ PetscErrorCode Report(const SceneData &s, const std::vector<std::string> &errors
 
 } // namespace
 
+PetscErrorCode TellOnce(SceneData &s, const std::string &text)
+{
+  PetscFunctionBegin;
+  if (s.told.insert(text).second) PetscCall(PetscPrintf(s.comm, "%s", text.c_str()));
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode CheckDescription(SceneData &s)
 {
   Check check(s);
@@ -177,7 +184,11 @@ PetscErrorCode CheckDescription(SceneData &s)
   PetscCheck(!s.bodies.empty() || !s.extensions.empty(), s.comm, PETSC_ERR_ARG_WRONGSTATE, "the scene has no bodies");
   check.all();
   PetscCall(Report(s, check.errors(), "the scene cannot be built"));
-  if (s.planar && s.gravity(2) != 0) PetscCall(PetscPrintf(s.comm, "scene: gravity along z, %g, moves nothing: the scene is planar, its bodies move along x and y\n", s.gravity(2)));
+  if (s.planar && s.gravity(2) != 0) {
+    char text[160];
+    PetscCall(PetscSNPrintf(text, sizeof(text), "scene: gravity along z, %g, moves nothing: the scene is planar, its bodies move along x and y\n", s.gravity(2)));
+    PetscCall(TellOnce(s, text));
+  }
   PetscFunctionReturn(0);
 }
 

@@ -59,6 +59,7 @@ void Scene::describeAnew()
   s.comm          = data().comm;
   s.planar        = data().planar;
   s.errors        = journal_->errors;
+  s.told          = data().told;
   s.parameters    = data().parameters;
   for (ParameterData &p : s.parameters) p.described = *p.present;
   model_.swap(next);

@@ -371,11 +371,8 @@ PetscErrorCode KeepSingular(Model &M, const std::vector<RowBlock> &blocks, std::
     std::vector<RowBlock>     there = DescribeAll(s, s.start.time, FixedBodies::None, ModalColumns::Included);
     const std::vector<RowRef> next  = FindRedundant(s, there);
     if (next.size() < found.size()) {
-      PetscCall(PetscPrintf(
-          s.comm,
-          "scene: the start is a singular position: %zu constraints are redundant there and %zu next to it; "
-          "a start elsewhere is safer\n",
-          found.size(), next.size()));
+      PetscCall(TellOnce(s, "scene: the start is a singular position: " + std::to_string(found.size()) + " constraints are redundant there and " + std::to_string(next.size()) +
+                              " next to it; a start elsewhere is safer\n"));
       found = next;
     }
   } else {
@@ -393,7 +390,7 @@ PetscErrorCode KeepSingular(Model &M, const std::vector<RowBlock> &blocks, std::
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode ReportRedundant(const SceneData &s, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &found)
+PetscErrorCode ReportRedundant(SceneData &s, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &found)
 {
   const std::size_t max_named = 5;
   std::string       list;
@@ -409,8 +406,7 @@ PetscErrorCode ReportRedundant(const SceneData &s, const std::vector<RowBlock> &
       s.start.redundant == Redundant::Drop, s.comm, PETSC_ERR_ARG_WRONG,
       "%zu of %d constraints follow from the others:%s\nUse joints that leave more freedom, or -scene_redundant drop",
       found.size(), (int)s.started.rows, list.c_str());
-  PetscCall(PetscPrintf(s.comm, "scene: %zu redundant of %d constraints dropped:%s\n", found.size(),
-                        (int)s.started.rows, list.c_str()));
+  PetscCall(TellOnce(s, "scene: " + std::to_string(found.size()) + " redundant of " + std::to_string(s.started.rows) + " constraints dropped:" + list + "\n"));
   PetscFunctionReturn(0);
 }
 
@@ -427,13 +423,12 @@ bool ReadsDroppedRow(const SceneData &s, const ElementData &e)
 }
 
 /* Warns of friction elements that read the multiplier of a dropped row: it is zero, since other joints carry the load */
-PetscErrorCode WarnReaders(const SceneData &s)
+PetscErrorCode WarnReaders(SceneData &s)
 {
   PetscFunctionBegin;
   for (const ElementData &e : s.elements)
     if (ReadsDroppedRow(s, e))
-      PetscCall(PetscPrintf(s.comm, "scene: %s %s takes the forces of dropped rows for zero: put it on the joint that is left to carry the load, or use joints that leave more freedom\n",
-                            e.type, e.name.c_str()));
+      PetscCall(TellOnce(s, "scene: " + std::string(e.type) + " " + e.name + " takes the forces of dropped rows for zero: put it on the joint that is left to carry the load, or use joints that leave more freedom\n"));
   PetscFunctionReturn(0);
 }
 

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <typeindex>
 #include <vector>
@@ -150,6 +151,7 @@ struct SceneData {
   std::vector<std::vector<PetscInt>> lines; /* of markers, in the animation */
   std::vector<ParameterData>  parameters;
   std::vector<std::string>    errors; /* found while the scene was described */
+  std::set<std::string>       told;   /* notices that were printed, which runs with other parameters do not repeat */
   StartPolicy                                           start;  /* with options */
   StartResult                 started;
   bool                                                  fixed        = false; /* from setUp() on nothing may be added but markers for queries */
@@ -182,6 +184,9 @@ struct SceneData {
   Frame<double> frame(Marker m) const;
   Twist<double> twist(Marker m) const;
 };
+
+/* Prints a notice, once for all runs of the scene. The text is the same on all ranks. */
+PetscErrorCode TellOnce(SceneData &s, const std::string &text);
 
 /*
   Enters a joint or force into the scene:

@@ -164,6 +164,33 @@ TEST(Parameters, AnElementThatMayBeMissing)
   }
 }
 
+/* A sweep is told once which constraints were dropped, and again where these are others */
+TEST(Parameters, RedundantConstraintsAreToldOnce)
+{
+  Scene           s(PETSC_COMM_SELF);
+  const Parameter mass = s.parameter("mass", 1), third = s.parameter("third", 0);
+  const Body      door = s.add("door", [p = mass] {
+    RigidBody b;
+    b.mass = p;
+    return b;
+  });
+  const auto hinge = [&](double height) { return Revolute{s.marker(door, {0, 0, height}), s.marker(s.ground(), {0, 0, height})}; };
+  s.add("low", hinge(-1));
+  s.add("high", hinge(1));
+  s.add("middle", [third, between = hinge(0)] { return third > 0 ? std::optional<Revolute>(between) : std::nullopt; });
+  const auto told = [&](double m, double there) {
+    must(s.set("mass", m));
+    must(s.set("third", there));
+    Printed printed;
+    must(s.setUp());
+    return printed.text();
+  };
+  EXPECT_NE(told(1, 0).find("5 redundant of 10"), std::string::npos);
+  EXPECT_EQ(told(2, 0), "");
+  EXPECT_NE(told(2, 1).find("10 redundant of 15"), std::string::npos);
+  EXPECT_EQ(told(1, 0), "");
+}
+
 /* Handles are numbers: those of markers that come after one that is missing would stand for others */
 TEST(Parameters, MarkersOfAnElementThatMayBeMissing)
 {
