@@ -1,6 +1,6 @@
 /*
-  Analyses beside the run in time. Each of them moves a run that has not begun, one of Scene::createTS(), to another state at time t:
-  Snapshot, Linearization and TSSolve() go on from there. Repeated with t after t they are a quasi-static or a kinematic analysis.
+  Analyses other than integration in time. Each one moves a run of Scene::createTS() that has not begun to another state at time t, from
+  which Snapshot, Linearization and TSSolve() continue. Repeated for increasing t they are a quasi-static or a kinematic analysis.
 
     PetscCall(scene.createTS(&ts));
     for (int k = 0; k <= 10; k++) {
@@ -8,18 +8,18 @@
       PetscCall(now.take(ts));                           positions, reactions
       ...
 
-  With other parameters, or from where a run has got to, the next one is made first: scene.createTS(&next, ts). All calls are collective.
-  After an error the run is where it was.
+  For other parameters, or to start from the state that a run has reached, make a new run first: scene.createTS(&next, ts). All calls are
+  collective. After an error the state of the run is unchanged.
 
-  Options of solvers have these prefixes, whatever that of the TS is:
+  Options of solvers have these prefixes, whatever the prefix of the TS is:
 
     -scene_assemble_        the linear solver that moves bodies at the start, in the metric of the masses: -scene_assemble_ksp_view
     -scene_assembly_        the linear solver of all analyses for positions that meet the constraints
-    -scene_equilibrium_     the linear solver of the way downhill to equilibrium, StartPolicy::equilibrium as well
+    -scene_equilibrium_     the linear solver of the descent to equilibrium, also for StartPolicy::equilibrium
     -scene_response_        the linear solver of Linearization::response(), linearize.h
     -scene_modes_           SLEPc's solver of SlowestModes(), modes.h; -scene_modes_st_ that of its shifted matrix
 
-  They are read where such a solver is made; an option that nobody has read is named when PETSc ends.
+  They are read when such a solver is created; PetscFinalize() names options that were never read.
 */
 #ifndef HHTDAE_ANALYSES_H
 #define HHTDAE_ANALYSES_H
@@ -29,12 +29,13 @@
 namespace hhtdae
 {
 
-/* To static equilibrium at time t, at rest: the one downhill from where the run is, or nearest to it. Motions hold where they are at t;
-   rates of first-order states are zero, and states that nothing reads keep their values. Motions of velocities and accelerations that are not zero then have none. */
+/* Moves the run to static equilibrium at time t, at rest: the equilibrium downhill from the present state, or nearest to it. Motions are held at
+   their values at t; rates of first-order states are zero, and states that nothing reads keep their values. With motions of velocities
+   or accelerations that are not zero at t there is no equilibrium. */
 PetscErrorCode StaticEquilibrium(TS ts, PetscReal t);
 
-/* To the nearest positions, and velocities, that meet all constraints and motions at time t, in the metric of the masses. fixed_start
-   does not count, multipliers and force states are found by the next question or step. */
+/* Moves the run to the nearest positions and velocities, in the metric of the masses, that satisfy all constraints and motions at time t.
+   fixed_start is ignored; multipliers and force states are computed by the next query or step. */
 PetscErrorCode AssembleAt(TS ts, PetscReal t);
 
 /* The same where motions and joints leave no freedom, which is an error otherwise: positions, velocities and, in a Snapshot,

@@ -1,22 +1,22 @@
 /*
-  Numbers that carry their derivatives along (automatic differentiation, forward mode). They are plain values: they are copied,
-  kept and returned like doubles, and they mix with doubles and integers.
+  Numbers with derivatives (automatic differentiation, forward mode). They can be copied, stored and returned like doubles, and mixed with
+  doubles and integers.
 
     Dual<N>             a value and N first derivatives
     Dual<N, Dual<N>>    second derivatives as well: x.derivatives()(a).derivatives()(b)
     Real                up to 16 derivatives, their number known at run time: arguments of users' expressions
 
-  Arithmetic, comparisons (of the values alone), sin cos tan asin acos atan atan2 sinh cosh tanh exp log log10 pow sqrt cbrt hypot
-  abs fabs min max. Any other function of x by its own value and derivative at x.value(): chain(x, f, f1).
+  Available: arithmetic, comparisons (of the values only), sin cos tan asin acos atan atan2 sinh cosh tanh exp log log10 pow sqrt cbrt hypot
+  abs fabs min max. Any other function of x is chain(x, f, f1), with its value f and derivative f1 at x.value().
 
-  Values are those of the functions of <cmath>. Derivatives where a function has none, or no finite one:
+  Values are those of the functions of <cmath>. At points where a function has no derivative, or no finite one, the derivative is:
     sqrt, cbrt, log and pow at 0, asin and acos at +-1   infinite as their limits
     abs at 0, hypot at the origin                        0, the mean of both sides
     atan2 at the origin                                  not a number
     min and max of equal values                          that of the first argument
-  A direction in which the argument does not change (derivative exactly 0) has derivative 0 there, too: sqrt(x*x) at 0 has 0.
-    pow(x, p)   with a number p is defined at x < 0 for whole p, at x = 0 with derivative p 0^(p-1), and is 1 for p = 0
-    pow(x, y)   with y that changes: d/dy = x^y log x, 0 at x = 0 where y > 0; at x < 0 not a number
+  Where the argument's derivative is exactly 0, the result's derivative is 0 even there: sqrt(x*x) at 0 has derivative 0.
+    pow(x, p)   with a constant p is defined at x < 0 for integer p, at x = 0 with derivative p 0^(p-1), and is 1 for p = 0
+    pow(x, y)   with a variable y: d/dy = x^y log x; it is 0 at x = 0 for y > 0, and not a number at x < 0
 */
 #ifndef HHTDAE_DUAL_H
 #define HHTDAE_DUAL_H
@@ -29,17 +29,17 @@
 namespace hhtdae
 {
 
-/* The plain number inside */
+/* The value as a double, without derivatives of any level */
 inline double Plain(double x) { return x; }
 template <class D, class = typename D::Value> double Plain(const D &x) { return Plain(x.value()); }
 
 /*
-  What both kinds of numbers share; D is one of them, with a value(), of type Value, and
+  Operations of both kinds of numbers, Dual and Real. D is the kind; it has value(), of type Value, and
 
     D::linear(f, x, a)         value f, derivatives a x'
     D::linear(f, x, a, y, b)   value f, derivatives a x' + b y'
 
-  The functions are found by their arguments; being no templates, they win over std::min and std::max where both are in sight.
+  Argument-dependent lookup finds the functions; they are not templates, so that overload resolution prefers them to std::min and std::max.
 */
 template <class D, class V> class DualFunctions
 {
@@ -79,7 +79,7 @@ public:
   friend bool operator<=(const D &x, const D &y) { return Plain(x) <= Plain(y); }
   friend bool operator>=(const D &x, const D &y) { return Plain(x) >= Plain(y); }
 
-  /* f(x) from the value and the derivative of f at x.value(); f(x, y) likewise */
+  /* f(x) from value f and derivative f1 at x.value(); f(x, y) from value f and partial derivatives fx, fy */
   friend D chain(const D &x, const V &f, const V &f1)
   {
     return finite(f1) ? D::linear(f, x, f1) : D::linear(f, x, Steep{f1});
@@ -214,7 +214,7 @@ public:
   }
 
 protected:
-  /* A factor that is not finite: zero times it is zero */
+  /* A factor that is not finite; its product with zero is defined as zero */
   struct Steep {
     V factor;
     V operator*(const V &x) const { return product(factor, x); }
@@ -252,7 +252,7 @@ public:
     const T             &operator[](int k) const { return x[k]; }
   };
 
-  Dual() = default; /* nothing is set, as in a double */
+  Dual() = default; /* uninitialized, like a double */
   template <class S, std::enable_if_t<std::is_arithmetic<S>::value || std::is_same<S, T>::value, int> = 0>
   Dual(const S &constant) : d_{}, value_(constant)
   {
@@ -317,7 +317,7 @@ private:
   T           value_;
 };
 
-/* A number without derivatives is a constant and goes with all others; numbers of functions of 2 and of 3 arguments do not mix. */
+/* A Real without derivatives is a constant and combines with all others. Two Reals with different numbers of derivatives cannot be combined. */
 class Real : public DualFunctions<Real, double>
 {
 public:

@@ -1,5 +1,5 @@
 /*
-  Functions that a user gives: of time, with exact derivatives, and of the state, through measures.
+  Functions that the user provides: of time, with exact derivatives, and of the state, through measures.
 */
 #ifndef HHTDAE_FUNCTIONS_H
 #define HHTDAE_FUNCTIONS_H
@@ -29,21 +29,21 @@ public:
   static TimeFunction polynomial(const std::vector<double> &coefficients);
   /* offset + amplitude sin(omega t + phase) */
   static TimeFunction harmonic(double amplitude, double omega, double phase = 0, double offset = 0);
-  /* from x0 before t0 to x1 after t1, as STEP and STEP5 are known: by the cubic x0 + (x1 - x0) s^2 (3 - 2 s) with s = (t - t0)/(t1 - t0),
-     whose second derivative jumps at both ends, and by the quintic x0 + (x1 - x0) s^3 (10 - 15 s + 6 s^2), twice continuously
-     differentiable. A motion of positions takes the quintic: with the cubic accelerations and reactions jump. */
+  /* From x0 before t0 to x1 after t1, as Adams' STEP and STEP5: step() is the cubic x0 + (x1 - x0) s^2 (3 - 2 s) with
+     s = (t - t0)/(t1 - t0), whose second derivative jumps at both ends; step5() is the quintic x0 + (x1 - x0) s^3 (10 - 15 s + 6 s^2), which
+     is twice continuously differentiable. Use the quintic for a motion of positions: with the cubic, accelerations and reactions jump. */
   static TimeFunction step(double t0, double x0, double t1, double x1);
   static TimeFunction step5(double t0, double x0, double t1, double x1);
   /* natural cubic spline through (t_k, x_k), t increasing, continued linearly */
   static TimeFunction spline(const std::vector<double> &t, const std::vector<double> &x);
   /* any formula in t, differentiated automatically: [](TimeFunction::Number t) { return sin(t) * t; } */
   static TimeFunction formula(std::function<Number(const Number &)> f);
-  /* values and derivatives by the user's own hand */
+  /* f, f' and f'' computed by the user's function */
   static TimeFunction values(std::function<Value(double)> f);
 
   Value operator()(double t) const { return f_ ? f_(t) : Value{constant_, 0, 0}; }
   bool  isConstant() const { return !f_; }
-  const std::string &error() const { return error_; } /* what is wrong with it, empty if nothing */
+  const std::string &error() const { return error_; } /* error in the arguments it was made from; empty: none */
 
 private:
   static TimeFunction faulty(const std::string &error);
@@ -54,7 +54,7 @@ private:
 };
 
 /*
-  A scalar that can be read off the state: an argument of expressions, a term of couplers, an output channel.
+  A scalar function of the state: an argument of expressions, a term of couplers, an output channel.
   Components are 0, 1, 2 for x, y, z of the marker `frame` (default: the ground's, space axes).
 */
 struct Measure {
@@ -63,7 +63,7 @@ struct Measure {
     Displacement,        /* of marker i from marker j (default: the space origin), component in frame */
     Distance,            /* |x_i - x_j| */
     Velocity,            /* of i relative to j (time derivative taken in space), component in frame */
-    Rate,                /* d Distance / dt; 0 where the markers coincide, which has no derivative there */
+    Rate,                /* d Distance / dt; 0 where the markers coincide, since the distance has no derivative there */
     Acceleration,        /* of i relative to j, component in frame */
     Angle,               /* of i's x axis about j's z axis, from j's x axis; in (-pi, pi] at the start, counted over full turns from there */
     AngularVelocity,     /* of i relative to j, component in frame */
@@ -71,17 +71,17 @@ struct Measure {
     Multiplier,          /* of row `component` of a joint or motion; which row is what: joints.h */
     JointForce,          /* of a joint or motion on its marker i's body, component in frame (default: marker j) */
     JointMoment,         /* likewise, about marker i's origin */
-    Component,           /* component of a force element, forces.h: force state where it is carried as one, else its value */
+    Component,           /* component of a force element (forces.h): the force state F if the element has `state`, else the computed value */
     Value,               /* of a variable V */
     StateValue,          /* of a first-order state */
     Modal,               /* modal coordinate `component` of a flexible body */
-    ElementForce,        /* of any element on the body of marker i, component in frame (default: space axes); for output alone. A body that the
-                            element does not act on is an error here, so that no channel is zero by mistake; it is zero in Snapshot::load() */
+    ElementForce,        /* of any element on the body of marker i, component in frame (default: space axes); for output only. A body that the
+                            element does not act on is an error here, so that no channel is zero by mistake (Snapshot::load() gives zero) */
     ElementMoment,       /* likewise, about marker i's origin */
-    KineticEnergy,       /* of the whole scene; for output alone */
-    PotentialEnergy      /* likewise: of gravity, modes, FE models, SpringDamper, TorsionalSpringDamper, Bushing, Beam, contacts and stops. What the user's own
-                            functions do has no potential here, nor has groundAcceleration(), constant or not: NonlinearSpring,
-                            NonlinearTorsionalSpring, UserForce, UserScalarForce */
+    KineticEnergy,       /* of the whole scene; for output only */
+    PotentialEnergy      /* likewise: of gravity, modes, FE models, SpringDamper, TorsionalSpringDamper, Bushing, Beam, contacts and stops.
+                            Forces from user functions (NonlinearSpring, NonlinearTorsionalSpring, UserForce, UserScalarForce) and
+                            groundAcceleration(), constant or not, are not included */
   };
   Kind     kind      = Time;
   Marker   i, j, frame;
@@ -111,12 +111,12 @@ struct Measure {
   static Measure potentialEnergy() { return {PotentialEnergy, {}, {}, {}}; }
 };
 
-/* STEP and STEP5 of x, for expressions and force laws: from h0 for x <= x0 to h1 for x >= x1 by the cubic and by the quintic of
-   TimeFunction::step() and step5() */
+/* STEP and STEP5 of a Real x, for expressions and force laws: from h0 for x <= x0 to h1 for x >= x1, by the cubic of TimeFunction::step()
+   and the quintic of TimeFunction::step5() */
 Real step(const Real &x, double x0, double h0, double x1, double h1);
 Real step5(const Real &x, double x0, double h0, double x1, double h1);
 
-/* A user's function of Reals, which are differentiated automatically (dual.h); it returns a Real or a constant. */
+/* A user's function of Reals, which is differentiated automatically (dual.h); it returns a Real or a constant. */
 template <class... Arguments> using RealFunction = std::function<Real(Arguments...)>;
 
 /* A force or moment as a function of a position and its rate */

@@ -1,5 +1,5 @@
 /*
-  What descriptions of scenes need again and again: axes along a direction, moments of inertia, joints from a point and an axis.
+  Helpers for describing scenes: axes along a direction, moments of inertia, joints from a point and an axis.
 
     RigidBody rod;
     rod.mass     = 2;
@@ -16,9 +16,9 @@
 namespace hhtdae
 {
 
-/* Orthonormal right-handed axes (columns) whose z axis is along a direction, which need not be of length one; x as near to `x` as can
-   be. If `x` is along z or not given, x is as near as can be to the axis of space along which z has its least component, the first one
-   of several: z along (0, 0, 1) has the axes of space themselves. */
+/* Orthonormal right-handed axes (columns). The z axis is along `z`, which need not be of unit length; the x axis is the direction
+   perpendicular to it that is nearest to `x`. If `x` is along z or not given, the space axis along which z has its smallest component (the
+   first of several) takes the place of `x`: z along (0, 0, 1) gives the space axes themselves. */
 inline Matrix3 axesAlong(const Vector3 &z, const Vector3 &x = Vector3::Zero())
 {
   Matrix3 A;
@@ -62,16 +62,16 @@ inline Matrix3 ellipsoid(double mass, const Vector3 &radii)
 }
 inline Matrix3 sphere(double mass, double radius) { return ellipsoid(mass, Vector3::Constant(radius)); }
 
-/* from the centre of mass to a point at d from it: Steiner's parallel axes; what it gives about any point but the centre of mass is no
-   RigidBody::inertia */
+/* Parallel-axis theorem (Steiner): inertia about the point at d from the centre of mass. RigidBody::inertia is about the centre of
+   mass, so the result is of use there only as a part of a sum about the common centre of mass */
 inline Matrix3 about(const Matrix3 &J, double mass, const Vector3 &d) { return J + mass * (d.squaredNorm() * Matrix3::Identity() - d * d.transpose()); }
-/* of a part whose axes are the columns of R, in the axes that R is given in */
+/* Inertia J, given in the part's own axes (the columns of R), transformed to the axes in which R is given */
 inline Matrix3 turned(const Matrix3 &J, const Matrix3 &R) { return R * J * R.transpose(); }
 
 } // namespace inertia
 
-/* A body of several rigid parts: mass, centre of mass and inertia of all, in the axes in which the parts' positions and rotations are
-   given, with its origin there */
+/* One rigid body made of several parts: total mass, centre of mass and inertia. Its origin and axes are those in which the positions and
+   rotations of the parts are given. */
 inline RigidBody composed(const std::vector<RigidBody> &parts)
 {
   RigidBody all;
@@ -86,9 +86,10 @@ inline RigidBody composed(const std::vector<RigidBody> &parts)
   return all;
 }
 
-/* A joint of two bodies from a point and an axis of space at the start: markers on both, with the axes axesAlong(axis). For all joints that two
-   markers alike describe: Revolute, Spherical, Cylindrical, Translational, Planar, Fixed, Screw, InLine, InPlane, ParallelAxes, Orientation.
-   In planar scenes the axis is z, and Translational slides along x of space; for another direction there make the markers. */
+/* A joint of two bodies from a point and an axis at the start, both in space axes: makes markers on both bodies there, with the axes
+   axesAlong(axis). For all joints between two coinciding markers: Revolute, Spherical, Cylindrical, Translational, Planar, Fixed, Screw,
+   InLine, InPlane, ParallelAxes, Orientation. In planar scenes the axis is z, and Translational slides along x of space; for another
+   direction make the markers yourself. */
 template <class Joint> Element connect(Scene &scene, const std::string &name, Body i, Body j, const Vector3 &point, const Vector3 &axis = Vector3::UnitZ())
 {
   const Matrix3 A = axesAlong(axis);

@@ -30,7 +30,7 @@ typedef enum {
 } TSHHT3Form;
 PETSC_EXTERN const char *const TSHHT3Forms[];
 
-/* What an unknown is, and with it its row of the residual */
+/* Role of an unknown; it determines what the unknown's row of the residual is */
 typedef enum {
   TSHHT3_COORDINATE,   /* generalized coordinate q; its row is an equation of motion, affine in q'' */
   TSHHT3_STATE,        /* first-order state; its row has U' and no U'' of its own */
@@ -42,19 +42,19 @@ typedef enum {
 } TSHHT3Role;
 PETSC_EXTERN const char *const TSHHT3Roles[];
 
-/* What to do about initial values that violate the constraints */
+/* Treatment of initial values that violate the constraints */
 typedef enum {
-  TSHHT3_START_OFF,    /* take them as they are */
-  TSHHT3_START_REPORT, /* measure the misfit and report it where it matters (the default) */
+  TSHHT3_START_OFF,    /* use them as they are */
+  TSHHT3_START_REPORT, /* measure the violation and report it where it matters (the default) */
   TSHHT3_START_PROJECT /* move q_0 and q'_0 to the nearest consistent values in the metric of the mass matrix */
 } TSHHT3Start;
 PETSC_EXTERN const char *const TSHHT3Starts[];
 
-/* For TSHHT3SetOrder(): HHT of order two, and orders three to five where the motion is smooth */
+/* Argument of TSHHT3SetOrder(): order two (HHT), and orders three to five where the motion is smooth */
 #define TSHHT3_ORDER_AUTO (-1)
 
-/* Cumulative counters of a run from its first start on, without the set-up. The summary line has them in this order, but for `changes`, which come last if there
-   were any, and `of_order`, which it leaves out. */
+/* Counters of a run, summed over all calls of TSSolve(), without the set-up. The summary line prints them in this order, except that
+   `changes` comes last (and only if there were any) and that `of_order` is left out. */
 typedef struct {
   PetscInt  steps;           /* accepted steps */
   PetscInt  rejected;        /* steps rejected by the error test */
@@ -63,13 +63,13 @@ typedef struct {
   PetscInt  jacobians;       /* evaluations of the application's Jacobian */
   PetscInt  factorizations;  /* set-ups of the preconditioner with a new matrix */
   PetscInt  solves;          /* linear solves */
-  PetscReal time;            /* wall-clock seconds from the first step of a TSSolve() to its end, of all of them; in between up to now */
-  PetscReal cpu;             /* CPU seconds of this process over the same spans */
+  PetscReal time;            /* wall-clock seconds from the first step of a TSSolve() to its end (during a TSSolve(): up to now) */
+  PetscReal cpu;             /* CPU seconds of this process over the same intervals */
   PetscInt  corrector_fails; /* corrections that did not converge */
-  PetscInt  retries;         /* of these, repeated at the same h with a new matrix */
+  PetscInt  retries;         /* failed corrections that were repeated at the same h with a new matrix */
   PetscInt  restarts;        /* consistent starts: the first one, events, TSRestartStep() */
   PetscInt  changes;         /* changes of coordinates, TSHHT3SetCoordinateChange() */
-  PetscInt  tiny_steps;      /* steps shorter than rounding in q allows the corrector, advanced by Taylor series */
+  PetscInt  tiny_steps;      /* steps so short that rounding in q would swamp the accelerations; they are advanced by Taylor series */
   PetscReal h_min, h_max;    /* smallest and largest accepted step */
   PetscInt  of_order[6];     /* accepted steps of order 2, 3, 4, 5, at these indices */
 } TSHHT3Statistics;
@@ -95,23 +95,24 @@ PETSC_EXTERN PetscErrorCode TSHHT3GetIS(TS, TSHHT3Role, IS *);
 PETSC_EXTERN PetscErrorCode TSHHT3SetStart(TS, TSHHT3Start);
 PETSC_EXTERN PetscErrorCode TSHHT3SetNodes(TS, IS, Vec);
 
-/* New generalized coordinates in the course of a run: whether, the map of (U, U', U''), and the word that it is done */
+/* Change to other generalized coordinates during a run: the test whether it is due, the map of (U, U', U'') to the new coordinates, and
+   the notice that the change has been made */
 typedef PetscErrorCode (*TSHHT3ChangeTest)(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *ctx);
 typedef PetscErrorCode (*TSHHT3ChangeMap)(TS ts, PetscReal t, Vec U, Vec V, Vec A, void *ctx);
 typedef PetscErrorCode (*TSHHT3ChangeCommit)(TS ts, void *ctx);
 PETSC_EXTERN PetscErrorCode TSHHT3SetCoordinateChange(TS, TSHHT3ChangeTest, TSHHT3ChangeMap, TSHHT3ChangeCommit, void *);
 
-/* Local rotation vectors: attitudes in U become those that they count from, or back to those before */
+/* Local rotation vectors: the attitudes in U become the new reference attitudes, or the previous reference is restored */
 typedef PetscErrorCode (*TSHHT3Refer)(TS ts, Vec U, void *ctx);
 typedef PetscErrorCode (*TSHHT3ReferBack)(TS ts, void *ctx);
 PETSC_EXTERN PetscErrorCode TSHHT3SetRotations(TS, IS, TSHHT3Refer, TSHHT3ReferBack, void *);
 PETSC_EXTERN PetscErrorCode TSHHT3GetRotationFactor(TS, PetscReal *, Vec *);
 
-/* The longest step from a state (U, U', U'') that the application allows */
+/* Largest step size h that the application allows from the state (U, U', U'') at time t */
 typedef PetscErrorCode (*TSHHT3StepLimit)(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx);
 PETSC_EXTERN PetscErrorCode TSHHT3SetStepLimit(TS, TSHHT3StepLimit, void *);
 
-/* What the application calls an unknown and its row, for messages */
+/* The application's name of an unknown and of its row, for messages */
 typedef PetscErrorCode (*TSHHT3RowName)(TS ts, PetscInt row, char name[], size_t len, void *ctx);
 PETSC_EXTERN PetscErrorCode TSHHT3SetRowName(TS, TSHHT3RowName, void *);
 

@@ -1,10 +1,10 @@
-/* For libraries on top of the integrator: options by name, so that misspelt ones are reported when PETSc ends. */
+/* For libraries on top of the integrator: they declare the names of their options, so that misspelt options are reported in PetscFinalize(). */
 #ifndef HHTDAE_OPTIONS_H
 #define HHTDAE_OPTIONS_H
 
 #include <petscsys.h>
 
-/* A list ended by NULL; the first entry is the beginning that all others share */
+/* The list ends with NULL; its first entry is the prefix that all other entries begin with */
 PETSC_EXTERN PetscErrorCode TSHHT3DeclareOptions(const char *const[]);
 
 #endif

@@ -1,17 +1,17 @@
 /*
-  What a run is doing: motion of any marker, loads of any element, energies, at any time of its last step, without having been asked
-  for beforehand.
+  Questions to a run: motion of any marker, loads of any element and energies at any time of the last step. Nothing has to be requested
+  before the run.
 
     Snapshot now;
     PetscCall(now.take(ts, t));                         the state of the run at time t
     Motion m;
     PetscCall(now.motion(tip, &m));                     position, axes, velocities, accelerations; space axes
     Load pin_load;
-    PetscCall(now.load(pin, tip, &pin_load));           what the joint does to the tip's body, moment about the tip
+    PetscCall(now.load(pin, tip, &pin_load));           force and moment (about the tip) of the joint on the tip's body
     double l;
     PetscCall(now.value(Measure::distance(a, b), &l));  any measure
 
-  All calls are collective: every rank asks the same questions and gets the same answers. A snapshot is of use as long as its TS is.
+  All calls are collective: every rank asks the same questions and gets the same answers. A snapshot is valid as long as its TS exists.
 */
 #ifndef HHTDAE_QUERY_H
 #define HHTDAE_QUERY_H
@@ -26,15 +26,15 @@ namespace hhtdae
 
 struct Runtime;
 
-/* Of a marker or body: everything in the axes asked for. */
+/* Motion of a marker or body; all components are in the axes that the call asks for. */
 struct Motion {
   Vector3 position = Vector3::Zero(), velocity = Vector3::Zero(), acceleration = Vector3::Zero();
-  Matrix3 axes = Matrix3::Identity(); /* its axes as columns */
+  Matrix3 axes = Matrix3::Identity(); /* axes of the marker or body, as columns */
   Vector3 angular_velocity = Vector3::Zero(), angular_acceleration = Vector3::Zero();
 
   Eigen::Quaterniond quaternion() const { return Eigen::Quaterniond(axes); }
   Vector3 euler() const;  /* 3-1-3: phi, theta, psi with axes = Rz(phi) Rx(theta) Rz(psi), theta in [0, pi]; psi is 0 where theta is 0 or pi */
-  Vector3 bryant() const; /* 1-2-3: axes = Rx(a) Ry(b) Rz(c), b in [-pi/2, pi/2]; c is 0 at its ends */
+  Vector3 bryant() const; /* 1-2-3: a, b, c with axes = Rx(a) Ry(b) Rz(c), b in [-pi/2, pi/2]; c is 0 where b is -pi/2 or pi/2 */
 };
 
 struct Load {
@@ -49,36 +49,35 @@ public:
   Snapshot(const Snapshot &)            = delete;
   Snapshot &operator=(const Snapshot &) = delete;
 
-  /* The state of a run that Scene::createTS() has begun, at time t between the ends of its last step. Accelerations, multipliers,
-     variables and force states are those that belong to positions and velocities at t, TSHHT3EvaluateAt(), at about the cost of a
-     factorization between the ends of a step; at its end at none, and then with the error of the step's own, which is many times as large, as a rule. With
-     fast modes that hardly anything damps, of flexible bodies above all, it is the other way round: what the interpolation of positions misses comes out in
-     accelerations and reactions within the step times the square of the highest frequency. Then ask at the ends of steps, or lower the tolerance. Before the first
-     step it is the start, whose accelerations and multipliers cost a consistent start and a step of a copy; after StaticEquilibrium() the equilibrium, with what
-     the motions would have moved held still. */
+  /* Takes the state of a run of Scene::createTS() at time t within the last step. Accelerations, multipliers, variables and force states
+     are solved for from the interpolated positions and velocities at t (TSHHT3EvaluateAt()), at about the cost of a factorization. At the
+     end of the step they are the results of the step: they cost nothing, but their error is, as a rule, many times as large. With fast
+     and hardly damped modes, above all of flexible bodies, the opposite holds: within the step, the error of interpolated positions enters
+     accelerations and reactions multiplied by the square of the highest frequency. Then ask at the ends of steps, or lower the tolerance.
+     Before the first step the state is the start, whose accelerations and multipliers cost a consistent start and one step of a copy of the
+     run; after StaticEquilibrium() it is the equilibrium, with all motions held still. */
   PetscErrorCode take(TS ts, PetscReal t);
   PetscErrorCode take(TS ts); /* at the end of the last step */
   PetscReal      time() const;
 
-  /* of a marker in the axes of another one (default: space axes), seen from space: its velocity is that relative to the space
-     origin, resolved in these axes; position from the space origin */
+  /* Absolute motion of a marker, relative to the space origin, with components in the axes of another marker (default: space axes) */
   PetscErrorCode motion(Marker m, Motion *x, Marker axes = {});
-  /* relative to another marker: position from its origin, and the motion that somebody on it sees, all in its axes */
+  /* Motion of marker m relative to marker `to`, as an observer fixed to `to` sees it: position from the origin of `to`, components in its axes */
   PetscErrorCode relativeMotion(Marker m, Marker to, Motion *x);
-  /* of a body: its centre of mass (undeformed, of a flexible one) and its body axes, in space axes */
+  /* Absolute motion of a body's centre of mass (of a flexible body: the undeformed one) and of the body axes, in space axes */
   PetscErrorCode motion(Body b, Motion *x);
   PetscErrorCode modes(Body flexible, std::vector<double> *coordinates);
 
-  /* What an element, joint, motion or force, does to the body of a marker: its force and its moment about the marker's origin, in the
-     axes of another marker (default: space axes). Zero if it does not touch that body, which Measure::elementForce() takes for an error. Of a flexible
-     body: to the attachment that the marker is on, or by loads and contacts of its modes, which have no attachment, to all of it; an error if it touches
-     another attachment alone. */
+  /* Load of an element (joint, motion or force) on the body of marker `on`: force, and moment about the marker's origin, in the axes of
+     another marker (default: space axes). The load is zero if the element does not act on that body (Measure::elementForce() reports an
+     error there). On a flexible body it is the load on the attachment that the marker belongs to; an element that acts only on another
+     attachment is an error. Modal loads and node contacts have no attachment: their load is that on the whole body. */
   PetscErrorCode load(Element e, Marker on, Load *x, Marker axes = {});
 
-  /* An angle counts full turns: from the start in planar scenes and where an element, a channel or an expression reads it, else from the first
-     question for it on */
+  /* Value of a measure. Angles count full turns: from the start in planar scenes and where an element, a channel or an expression reads the
+     angle, otherwise from the first call that asks for it */
   PetscErrorCode value(const Measure &m, double *x);
-  /* kinetic, potential energy of the scene, of what Measure::PotentialEnergy names */
+  /* Kinetic and potential energy of the scene; Measure::PotentialEnergy lists what has a potential */
   PetscErrorCode energy(double *kinetic, double *potential);
 
 private:

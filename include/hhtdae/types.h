@@ -2,8 +2,8 @@
 #ifndef HHTDAE_TYPES_H
 #define HHTDAE_TYPES_H
 
-/* Eigen's matrices go in and out of the library, so that their alignment and how they are freed must be the library's, whatever
-   instructions (-mavx, -march=native) or sanitizer a program is compiled with. The CMake package and pkg-config define the same. */
+/* Programs and the library exchange Eigen matrices, so both must allocate, align and free them alike, whatever instruction set
+   (-mavx, -march=native) or sanitizer a program is compiled with. The CMake package and pkg-config define the same macros. */
 #if !defined(EIGEN_CORE_H) && !defined(EIGEN_CORE_MODULE_H)
   #if !defined(EIGEN_MAX_ALIGN_BYTES)
     #define EIGEN_MAX_ALIGN_BYTES 16
@@ -25,7 +25,7 @@ namespace hhtdae
 using Vector3 = Eigen::Vector3d;
 using Matrix3 = Eigen::Matrix3d;
 
-/* Handles: cheap to copy, valid in the scene that made them, whose number they bear. A default one refers to nothing. */
+/* Handles are cheap to copy and valid only in the scene that made them; `scene` is its number. A default-constructed handle refers to nothing. */
 struct Body {
   PetscInt id    = -2; /* -1: ground */
   PetscInt scene = 0;
