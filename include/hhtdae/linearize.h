@@ -12,22 +12,24 @@
 
     M x'' + C x' + K x = b f,
 
-  x: displacements and small rotations of bodies, and all other unknowns as they are. M, C and K are those of this moment: small motions go on with
-  them where the state is in equilibrium, or steady as seen from the axes that x is in. These are at this moment those of space, and from then on they turn with
+  where x has displacements and small rotations of bodies, and changes of all other unknowns. M, C and K are taken at the time of the state.
+  They remain constant only if the state is an equilibrium, or a motion that is steady in the axes that x refers to. At the time of the state
+  these axes are the space axes; from then on they rotate with
 
-    the body that take() is given         a driven hub for its blades, the rotor for a shaft that is not round; modes in axes of a round rotor are
-                                          those in space, faster or slower by its speed
-    flexible bodies                       without one, where all of them turn alike: modal coordinates are in axes of the body
-    nothing                               else, and where take() is given the ground: an axisymmetric rotor of rigid discs at speed is steady as
-                                          seen from space
+    the body passed to take()             a driven hub for its blades, the rotor for a shaft that is not round; the frequencies of modes in the
+                                          axes of a round rotor differ from those in space by its speed
+    flexible bodies                       if no body is passed and all flexible bodies rotate alike, since modal coordinates are in body axes
+    nothing                               otherwise, or if the ground is passed to take(): an axisymmetric rotor of rigid discs at constant
+                                          speed is steady in space axes
 
-  Of flexible bodies that do not turn alike a notice says so. Loads and measures of space axes turn with the axes.
+  A notice reports flexible bodies that do not rotate alike. Loads and measures in space axes rotate with the axes of x.
 
-  A swinging rod is steady from nowhere. There modes() and stateSpace() are of the rates that small motions have at this moment, how constraints change
-  along the motion included: A is the derivative of (z', z'') by (z, z'), where z are lengths along what constraints leave, in units of masses. Of a single freedom
-  they are those of its path whatever the speed: the rod has value^2 = -m g l cos(angle)/J. What is sparse, response() and SlowestModes(), takes constraints as they
-  are at this moment: it is of equilibria and steady motions.
-  All calls are collective, with the same results on every rank. A linearization is of use as long as its TS is.
+  A swinging rod is not steady in any axes. In such a state modes() and stateSpace() describe the rates of small motions at this time,
+  including the change of constraints along the motion: A is the derivative of (z', z'') by (z, z'), where z are coordinates along the
+  directions that constraints leave free, orthonormal in the metric of the masses. For a single degree of freedom the result is that of motion along
+  its path at any speed: the rod has value^2 = -m g l cos(angle)/J. The sparse methods, response() and SlowestModes(), take constraints as
+  they are at this time; they are meant for equilibria and steady motions.
+  All calls are collective, with the same results on every rank. A linearization is valid as long as its TS exists.
 */
 #ifndef HHTDAE_LINEARIZE_H
 #define HHTDAE_LINEARIZE_H
@@ -39,26 +41,26 @@
 namespace hhtdae
 {
 
-/* Motion that goes as exp(value t). Of a conjugate pair the one with a positive imaginary part stands for both. */
+/* A motion proportional to exp(value t). A conjugate pair is represented by the mode with a positive imaginary part. */
 struct Mode {
   std::complex<double>              value;  /* 1/s */
-  std::vector<std::complex<double>> shape;  /* x, the unknowns of this rank; the largest displacement (in m) or rotation (in rad) of all is 1 */
+  std::vector<std::complex<double>> shape;  /* x, the unknowns of this rank; the largest displacement (m) or rotation (rad) over all ranks is 1 */
 
   double frequency() const { return std::abs(value) / (2 * M_PI); } /* undamped, Hz */
   double dampingRatio() const { return std::abs(value) > 0 ? -value.real() / std::abs(value) : 0; }
 };
 
-using Vector3c = Eigen::Matrix<std::complex<double>, 3, 1, Eigen::DontAlign>; /* the same for all compiler's options */
+using Vector3c = Eigen::Matrix<std::complex<double>, 3, 1, Eigen::DontAlign>; /* the same alignment for all options of the compiler */
 
-/* A body's part in a mode: of its centre of mass in space axes, and how much of the kinetic energy it has */
+/* A body's part in a mode: motion of its centre of mass in space axes, and its share of the kinetic energy */
 struct BodyPart {
   Vector3c displacement = Vector3c::Zero(), rotation = Vector3c::Zero();
   double   share = 0;
 };
 
-/* What an input of 1 is: a force and a moment in space axes on the body of a marker, at its origin; or what is added to the function of a
-   motion, displacement, velocity or acceleration as the motion is of: a shaken base; or the acceleration of the ground, relative to which all
-   coordinates are */
+/* Meaning of a unit input: a force and a moment in space axes on the body of a marker, at its origin; or an amount added to the function of a
+   motion (displacement, velocity or acceleration, as the motion prescribes), for a shaken base; or an acceleration of the ground, to which
+   all coordinates are relative */
 struct Excitation {
   Marker  at;
   Vector3 load = Vector3::Zero(), moment = Vector3::Zero();
@@ -70,8 +72,8 @@ struct Excitation {
   static Excitation groundAcceleration(const Vector3 &a) { return {{}, Vector3::Zero(), Vector3::Zero(), {}, a}; }
 };
 
-/* z' = A z + B f, y = C z + D f; z: as many as there are degrees of freedom of positions and of velocities, and first-order states. Rows
-   are behind one another. */
+/* z' = A z + B f, y = C z + D f; the size of z is the number of degrees of freedom of positions, plus that of velocities, plus the number of
+   first-order states. Matrices are stored row by row. */
 struct StateSpace {
   PetscInt            states = 0, inputs = 0, outputs = 0;
   std::vector<double> A, B, C, D;
