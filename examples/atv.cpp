@@ -120,7 +120,7 @@ static PetscErrorCode CreateTS(const Settings &s, hhtex::Atv &atv, TS *ts)
   PetscFunctionReturn(0);
 }
 
-/* About the equilibrium, in which the run starts */
+/* Prints the slowest modes about the equilibrium in which the run starts */
 static PetscErrorCode PrintModes(TS ts, const hhtex::Atv &atv, PetscInt count)
 {
   Linearization     small;
@@ -148,7 +148,7 @@ static PetscErrorCode Run()
   PetscCall(ReadSettings(&s));
   PetscCall(LoadModalBody(PETSC_COMM_WORLD, s.frame, model.get()));
   hhtex::Atv  atv(PETSC_COMM_WORLD, model);
-  ReducedBody body; /* with stress modes, where stress or pictures are asked for */
+  ReducedBody body; /* with stress modes, if stress or pictures are requested */
   const bool  recover = s.stress || !s.field.empty();
   if (recover) atv.watchFrame();
   if (recover || s.page) PetscCall(body.load(PETSC_COMM_WORLD, s.frame));

@@ -28,8 +28,8 @@ static std::vector<PetscInt> NodesOf(const FeModel &model, const hhtex::AtvAttac
   return nodes;
 }
 
-/* Stress at the corners of the elements alone: a sixth of the nodes, and the largest stress is among them on the
- * surface */
+/* Keeps the stress modes only at the corners of elements: these are a sixth of the nodes, and the largest stress occurs at one of them, on
+   the surface */
 static void KeepCorners(ReducedBody *body)
 {
   std::vector<char> corner((size_t)body->own, 0);

@@ -1,4 +1,4 @@
-/* The vehicle's frame: where its attachments are. Metres, x forward, y left, z up; the same axes as atv_frame.geo. */
+/* Positions of the attachments of the vehicle's frame. Metres, x forward, y left, z up; the same axes as atv_frame.geo. */
 #ifndef HHTEX_ATV_FRAME_H
 #define HHTEX_ATV_FRAME_H
 
@@ -11,7 +11,7 @@ namespace hhtex
 
 using hhtdae::Vector3;
 
-/* Nodes within `reach` of the centres, tied to `point` rigidly (brackets) or on the average (masses on soft mounts) */
+/* Nodes within `reach` of the centres, tied to `point` rigidly (brackets) or on average (masses on soft mounts) */
 struct AtvAttachment {
   std::string          name;
   Vector3              point;

@@ -35,7 +35,7 @@ struct AtvData {
   double steer = 0.10, steer_rate = 1;             /* rad, Hz */
 };
 
-/* The scene with what is looked at */
+/* The scene, with the markers, elements and channels that programs read */
 struct Atv {
   Scene                            scene;
   AtvData                          data;
@@ -65,7 +65,7 @@ struct Atv {
     reaction = scene.channel("rear ball joint", Measure::jointForce(rear_ball, 2, scene.marker(scene.ground())), "N");
   }
 
-  /* Channels that stress and pictures of the frame need */
+  /* Adds the channels from which stress and pictures of the frame are computed */
   void watchFrame()
   {
     for (PetscInt k = 0; k < model->modes(); k++)
@@ -78,7 +78,8 @@ struct Atv {
   {
     return Eigen::Map<const Eigen::VectorXd>(&channels[(std::size_t)modal[0].id], (Eigen::Index)modal.size());
   }
-  /* Pose of the frame's own axes, from points on it and the modes: exact, for attachments move with the modes alone */
+  /* Origin and axes of the floating frame, from the positions of attachments and the modal coordinates. The result is exact, because
+     attachments move relative to the floating frame only by the modes. */
   void pose(const std::vector<double> &channels, Vector3 *origin, Matrix3 *axes) const
   {
     Eigen::Matrix<double, 3, 4> from, to;
@@ -148,7 +149,7 @@ private:
     b.damping = {{100, 0.01},
                  {1000, 0.03},
                  {3000, 0.1},
-                 {1e9, 1}}; /* 1 % where it is heard, critical where only the solver is */
+                 {1e9, 1}}; /* 1 % damping in the audible range; critical damping for modes that matter only numerically */
     frame     = scene.add("frame", b);
     parts++;
   }
@@ -176,7 +177,7 @@ private:
     scene.line({scene.markerAt(column, head - 0.39 * axis), scene.markerAt(column, bars)});
   }
 
-  /* An arm on the frame: a ball at its first pivot, the second one on the line through both */
+  /* An arm on the frame: a ball joint at its first pivot; the second pivot stays on the line through both (in-line primitive) */
   Body addArm(const std::string &name, double mass, const Vector3 &first, const Vector3 &second, const Vector3 &ball,
               Body at_first, Body at_second)
   {

@@ -1,5 +1,4 @@
-/* A solid beam in a scene, in three ways: the whole finite-element model, modes of it, two-node beams between rigid
- * pieces. */
+/* A solid beam in a scene, modelled in three ways: the whole finite-element model, its modes, or two-node beams between rigid bodies. */
 #ifndef HHTEX_BEAM_BODIES_H
 #define HHTEX_BEAM_BODIES_H
 
@@ -10,12 +9,12 @@
 namespace hhtex
 {
 
-/* Bodies at the ends of the beam, with the space axes at the start, to join and to look at */
+/* Bodies at the ends of the beam, for joints and channels; at the start they have the space axes */
 struct BeamEnds {
   hhtdae::Body root, tip;
 };
 
-/* The root is held rigidly; the tip is watched as the mean motion of its face, if it is not held rigidly as well */
+/* The root is tied rigidly; the tip is the mean motion of its face, or also tied rigidly */
 inline std::vector<hhtdae::Attachment> BeamAttachments(hhtdae::Tie tip = hhtdae::Tie::Average)
 {
   std::vector<hhtdae::Attachment> ends(2);
@@ -38,8 +37,8 @@ inline PetscErrorCode AddFullBeam(hhtdae::Scene &scene, const hhtdae::FeModel &m
   PetscFunctionReturn(0);
 }
 
-/* Craig and Bampton's modes: those of the attachments, and normal modes; with geometric stiffening or without. Of
-   several parts one after the other, each is a body with modes of its own, from the model of one part. */
+/* Craig-Bampton modes (constraint modes of the attachments and normal modes), with or without geometric stiffening. A beam of several
+   parts in a row is a chain of bodies, each with the modes of the model of one part. */
 inline PetscErrorCode AddModalBeam(hhtdae::Scene &scene, const hhtdae::FeModel &part, double length, int parts,
                                    PetscInt modes, BeamEnds *ends, hhtdae::Tie tip = hhtdae::Tie::Average, bool stiffening = false)
 {
@@ -54,7 +53,7 @@ inline PetscErrorCode AddModalBeam(hhtdae::Scene &scene, const hhtdae::FeModel &
   reduction.stiffening  = stiffening;
   PetscCall(hhtdae::Reduce(part, reduction, &reduced));
   auto surface = std::make_shared<hhtdae::Surface>();
-  if (page) { /* the beam as it bends, coloured by stress */
+  if (page) { /* the page shows the deformed beam, coloured by stress */
     PetscCall(hhtdae::AddStressModes(part, &reduced));
     PetscCall(hhtdae::MakeSurface(reduced, surface.get()));
   }
@@ -74,7 +73,7 @@ inline PetscErrorCode AddModalBeam(hhtdae::Scene &scene, const hhtdae::FeModel &
   PetscFunctionReturn(0);
 }
 
-/* The mass is lumped at the nodes, half of a piece at either end */
+/* The mass is lumped at the nodes: each piece gives half of its mass to either end */
 inline void AddBeamElements(hhtdae::Scene &scene, const SolidBeam &beam, int pieces, BeamEnds *ends)
 {
   const double   l = beam.length / pieces, rho = beam.material.density;

@@ -1,7 +1,7 @@
 /*
   A straight beam with rectangular section as a finite-element model: a box of equal bricks with 8 or 20 nodes, or each
   of these cut into six tetrahedra with 10. Its axis is the x axis from 0 to its length. Node sets "root" and "tip" are
-  its ends. The mesh goes through a file as gmsh would write it, so that it is read and divided among the ranks as any.
+  its ends. The mesh is written to a file in Gmsh's format, and then read and divided among the ranks like any other mesh.
 */
 #ifndef HHTEX_BEAM_MESH_H
 #define HHTEX_BEAM_MESH_H
@@ -95,7 +95,7 @@ private:
     for (const auto &e : edges) std::fprintf(out_, " %ld", tag(middle(corners[e[0]], corners[e[1]])));
     std::fprintf(out_, "\n");
   }
-  /* A quarter of the face of a beam's end, as one or two faces of elements */
+  /* The end face of one brick at an end of the beam, as one or two element faces */
   void face(int physical, const std::vector<Place> &c)
   {
     if (b_.element == BeamElement::Brick8) element(3, physical, c, {});

@@ -22,7 +22,7 @@ namespace
 constexpr double height = 0.01, turn = 2 * M_PI;                            /* m, rad */
 constexpr double mass = 0.4, stiffness = 8e3, preload = 60, gravity = 9.81; /* of the follower and its spring */
 
-/* The lift at an angle: up in half a turn, down in the other, by the polynomial of degree 5 without jumps of the acceleration */
+/* The lift at an angle: up in the first half turn, down in the second, by the polynomial of degree 5, so that the acceleration is continuous */
 template <class T> T Lift(const T &angle, double plain)
 {
   const T      u = (angle - turn * std::floor(plain / turn)) * (1 / M_PI);
@@ -31,7 +31,7 @@ template <class T> T Lift(const T &angle, double plain)
   return height * w * w * w * (10. - w * (15. - 6. * w));
 }
 
-/* What theory says at angle a and speed w: force between cam and follower, torque on the shaft */
+/* Exact force between cam and follower, and torque on the shaft, at angle a and speed w */
 struct Exact {
   double force, torque;
 
@@ -121,7 +121,7 @@ PetscErrorCode Run()
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%11.0f  %13.3f  %15.3f  %18.4f%s\n", rpm, t.least, t.most, t.torque, t.least < 0 ? "  jumps off" : ""));
     error = std::max(error, t.error);
   }
-  /* At every point the force is quadratic in the speed: two turns say where it comes to zero. */
+  /* At every point the force is a constant plus a multiple of the speed's square: two turns determine the speed at which it is zero. */
   double jump = 1e300, exact = 1e300;
   Turn   slow;
   PetscCall(OneTurn(cam, 100, points, &slow));

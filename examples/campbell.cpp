@@ -22,7 +22,7 @@ namespace
 
 constexpr double length = 0.5, radius = 0.01, disc_radius = 0.15, disc_mass = 8, E = 2.1e11, G = 8e10;
 
-/* The shaft turns in a hub that nothing moves but about z */
+/* The shaft is fixed to a hub that can only rotate about z */
 struct Rotor {
   Scene  scene{PETSC_COMM_WORLD};
   Body   disc;
@@ -58,8 +58,8 @@ struct Rotor {
   }
 };
 
-/* How far w is from the root of Stodola's equation that is next to it, as part of w: a step of Newton's method on the determinant. Of a
-   forward whirl, or with w negative of a backward one */
+/* Relative distance of w from the nearest root of Stodola's equation, by one Newton step on the determinant; w > 0: forward whirl, w < 0:
+   backward whirl */
 double FromStodola(double speed, double w)
 {
   const double EI = E * M_PI * std::pow(radius, 4) / 4, L = length, It = disc_mass * disc_radius * disc_radius / 4, Ip = 2 * It;
@@ -67,7 +67,7 @@ double FromStodola(double speed, double w)
   return std::abs((a * d - b * b) / (w * (a * (Ip * speed - 2 * It * w) - 2 * disc_mass * w * d)));
 }
 
-/* Amplitude under the unbalance u, which is a static load in axes that turn with it */
+/* Exact amplitude for the unbalance u, which is a static load in axes that rotate with the shaft */
 double Whirl(double speed, double u)
 {
   const double    EI = E * M_PI * std::pow(radius, 4) / 4, L = length, It = disc_mass * disc_radius * disc_radius / 4, Ip = 2 * It, square = speed * speed;
@@ -76,7 +76,7 @@ double Whirl(double speed, double u)
   return std::abs(D.inverse()(0, 0) * u * square);
 }
 
-/* A force that turns is one along x and one along y, a quarter of a period later */
+/* A rotating force is the sum of a harmonic force along x and one along y a quarter of a period later */
 PetscErrorCode Unbalanced(const Rotor &r, const Linearization &small, double speed, double u, double *amplitude)
 {
   std::vector<std::complex<double>> x, y;
@@ -105,7 +105,7 @@ PetscErrorCode At(double speed, double u, const char film[], double worst[2])
     BodyPart disc;
     PetscCall(small.part(m, r.disc, &disc));
     const double bending = disc.displacement.head<2>().norm() + disc.rotation.head<2>().norm();
-    if (m.value.imag() > 1 && bending > 1e-6) found.push_back(m.value.imag()); /* not those along the shaft and about it */
+    if (m.value.imag() > 1 && bending > 1e-6) found.push_back(m.value.imag()); /* leaves out axial and torsional modes */
   }
   PetscCheck(found.size() == 4, PETSC_COMM_WORLD, PETSC_ERR_PLIB, "%d modes of bending at %g rad/s", (int)found.size(), speed);
   if (speed > 0) PetscCall(Unbalanced(r, small, speed, u, &whirl));

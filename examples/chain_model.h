@@ -24,7 +24,7 @@ inline hhtdae::Body AddRod(hhtdae::Scene &scene, const hhtdae::Vector3 &from, co
   return b;
 }
 
-/* From the origin along x; returns the end of the last rod */
+/* A chain of n rods from the origin along x; returns the end of the last rod */
 inline hhtdae::Marker AddChain(hhtdae::Scene &scene, PetscInt n, bool spherical)
 {
   using namespace hhtdae;

@@ -54,7 +54,7 @@ static PetscErrorCode Run(void)
   PetscCall(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr));
   PetscCall(TSSetFromOptions(ts));
 
-  /* ---- compared while it runs ---- */
+  /* ---- comparison during the run ---- */
   const long double    half_pi = std::acos(0.L);
   hhtex::Extrapolation exact(TwoAngles, 0, 0.02L, {half_pi, half_pi, 0, 0});
   double               error = 0, drift = 0, start = NAN;

@@ -1,4 +1,4 @@
-/* Two rods that fall from the horizontal, in revolute joints or, the second one across, on ball joints. */
+/* Two rods that fall from the horizontal: in revolute joints or, with the second rod perpendicular to the first, on ball joints. */
 #ifndef HHTEX_DOUBLEPENDULUM_MODEL_H
 #define HHTEX_DOUBLEPENDULUM_MODEL_H
 

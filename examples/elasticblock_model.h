@@ -122,7 +122,7 @@ inline PetscErrorCode model_number(Model *m)
   PetscFunctionReturn(0);
 }
 
-/* Rows of the three displacements of the nodes that this process sees, and its first multiplier */
+/* Rows of the three displacements of the nodes of this process and its neighbours, and of its first multiplier */
 struct Rows {
   PetscInt              x0[3], w[3], g0[3], gw[3]; /* owned nodes, and with the neighbours' */
   std::vector<PetscInt> row;
@@ -202,7 +202,7 @@ inline PetscErrorCode add_bricks(const Model &m, const Rows &r, const BrickMatri
   PetscFunctionReturn(0);
 }
 
-/* value = 1: Phi and its transpose; 0: their places alone, so that all matrices have one pattern */
+/* value = 1: adds Phi and its transpose; 0: only adds their entries to the pattern, so that all matrices have the same pattern */
 inline PetscErrorCode add_constraints(const Model &m, const Rows &r, PetscScalar value, Mat A)
 {
   PetscInt lambda = r.first_multiplier;

@@ -75,12 +75,12 @@ inline PetscErrorCode shifted_solver(const Model &m, double shift, KSP *ksp)
 }
 
 /*
-  The start, the load's own deflection, lies in the load's plane. Modes out of that plane may be lower; rounding lets
-  them in and every iteration lets them grow, so the iteration ends where its changes begin to grow.
+  The start vector, the static deflection under the load, lies in the load's plane. Modes out of that plane may have lower frequencies:
+  rounding introduces them and every iteration amplifies them. The iteration therefore ends when its changes begin to grow.
 */
 constexpr double MODE_TOLERANCE = 1e-10, MODE_ACCEPTED = 1e-6;
 
-/* x <- the displacements of x, less their part in the modes known so far, with x^T M x = 1; work = M x */
+/* Sets the multipliers in x to zero, M-orthogonalizes x to the known modes and scales it to x^T M x = 1; work = M x */
 inline PetscErrorCode normalize(const Model &m, const std::vector<Mode> &known, Vec x, Vec work)
 {
   PetscScalar c;
@@ -135,7 +135,7 @@ inline PetscErrorCode find_mode(const Model &m, KSP ksp, bool rigid, const std::
   PetscFunctionReturn(0);
 }
 
-/* The hinged block can rotate, so its K alone is singular and the modes are sought near a shift */
+/* K of the hinged block is singular, because it can rotate: its modes are sought near a shift */
 inline PetscErrorCode modes_find(const Model &m, Modes *modes)
 {
   const bool   hinged = m.options.support == HINGED;

@@ -5,7 +5,7 @@
 
     across: sin(pi xi) q1 + sin(2 pi xi) q2,   along: 4 xi (1 - xi) q3 + xi (2 xi - 1) q4
 
-  Mass and stiffness are the data of the test set: those of q3, q4 in the mass matrix are 15 times what the integrals give.
+  Mass and stiffness are the data of the test set; its entries of q3 and q4 in the mass matrix are 15 times the values of the integrals.
   The modes of the body diagonalize them, q = V eta.
 */
 #ifndef HHTEX_FLEXCRANK_MODEL_H
@@ -50,7 +50,7 @@ struct SimeonRod {
     body.mass   = mass;
     body.center = {length / 2, 0, 0};
     body.omega  = squares.cwiseSqrt();
-    /* a line but for its thickness in the plane; inertia about its own axis plays no part */
+    /* a thin rod, except for the thickness in the plane; the inertia about its own axis has no effect */
     const double xx = mass * length * length / 12, own = inertia - mass * length * length / 4;
     body.moments    = hhtdae::Vector3(xx, own - xx, 1e-7).asDiagonal();
 
@@ -83,7 +83,7 @@ struct SimeonRod {
   }
 };
 
-/* The mechanism, stretched out and near to smooth motion at the start */
+/* The mechanism, stretched out at the start, with initial values close to those of the smooth motion */
 struct FlexCrank {
   SimeonRod       rod;
   hhtdae::Scene   scene;

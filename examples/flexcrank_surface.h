@@ -1,5 +1,5 @@
-/* The elastic rod of the slider-crank as the page shows it: its four faces with the displacements of its modes, and the stress that the theory of beams
-   has for them, which is along the rod alone. */
+/* Surface of the slider-crank's elastic rod for the page: its four faces with the displacements of the modes, and the axial stress of beam
+   theory. */
 #ifndef HHTEX_FLEXCRANK_SURFACE_H
 #define HHTEX_FLEXCRANK_SURFACE_H
 

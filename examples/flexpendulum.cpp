@@ -36,7 +36,7 @@ struct Pendulum : hhtex::HangingArm {
   std::vector<PetscInt> modes = {4};
 };
 
-/* What is looked at, at equal distances in time */
+/* Indices of the values that are recorded at equal time intervals */
 enum { TipX, TipZ, MiddleX, MiddleZ, PinX, PinZ, Kinetic, Potential, Modal };
 struct History {
   std::string                      name;
@@ -44,7 +44,7 @@ struct History {
   std::vector<std::vector<double>> x;
   double                           seconds = 0;
 
-  /* of the middle from the line between pin and tip */
+  /* distance of the middle from the line between pin and tip */
   double deflection(std::size_t k, const Vector3 &hub, double share) const
   {
     const double dx = x[k][TipX] - hub(0), dz = x[k][TipZ] - hub(2), mx = x[k][MiddleX] - hub(0) - share * dx,
@@ -159,7 +159,7 @@ static PetscErrorCode SwingFull(const Pendulum &p, const FeModel &model, const M
 
 /* ---- results ---- */
 
-/* Where the arm is, as numbers that several results need */
+/* Undeformed position of the hub, and place of the middle along the arm, which several results need */
 struct Line {
   Vector3 hub;
   double  share; /* place of the middle along the arm */
@@ -181,7 +181,7 @@ static double EnergyDrift(const History &h)
   return drift / most;
 }
 
-/* Largest differences from another history: tip; deflection and force in the pin, as parts of their largest */
+/* Prints the largest differences from another history: position of the tip; deflection and force in the pin relative to their largest values */
 static PetscErrorCode Compare(const History &h, const History &other, const Line &line)
 {
   double tip = 0, deflection = 0, pin = 0, most = 0, force = 0;
@@ -220,7 +220,7 @@ static PetscErrorCode Stress(const Pendulum &p, const ReducedBody &body, const H
   PetscFunctionReturn(0);
 }
 
-/* Above the histories, below what they differ by from the first one */
+/* Plots the histories above, and their differences from the first one below */
 static PetscErrorCode Plot(const std::vector<History> &all, const Line &line, const std::string &file)
 {
   PetscMPIInt rank;

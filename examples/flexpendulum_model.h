@@ -26,7 +26,7 @@ struct HangingArm {
   hhtdae::Material material{7e10, 0.33, 2700};
 };
 
-/* Into p.mesh, or where this is empty into a file of its own, which is the caller's to remove */
+/* Writes the mesh to p.mesh or, if that is empty, to a new file, which the caller has to remove */
 inline PetscErrorCode MakeArmMesh(const HangingArm &p, std::string *file)
 {
   PetscMPIInt rank;
@@ -71,7 +71,7 @@ inline std::vector<hhtdae::Attachment> ArmAttachments()
   return a;
 }
 
-/* The arm of one kind or another: bodies that are held at hub, middle and tip, horizontal at the start */
+/* An arm of any kind, horizontal at the start: the bodies at its hub, middle and tip */
 struct Arm {
   hhtdae::Body hub, middle, tip, modal;
 };
@@ -83,7 +83,7 @@ inline hhtdae::Matrix3 AboutY() /* axes of markers: z along the pin */
   return R;
 }
 
-/* Everything but the arm; channels: place of tip and middle, force in the pin, x and z each; kinetic and potential energy */
+/* Adds everything except the arm. Channels: positions of tip and middle and force in the pin, x and z each; kinetic and potential energy */
 inline void Hang(const HangingArm &p, const hhtdae::ModalBody &shape, const Arm &arm, hhtdae::Scene &scene)
 {
   using namespace hhtdae;

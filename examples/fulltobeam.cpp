@@ -25,7 +25,7 @@ struct Settings {
 
   double EI() const { return beam.material.young * beam.Izz(); }
   double force(double load) const { return load * EI() / (beam.length * beam.length); }
-  /* of Euler and Bernoulli, Hz */
+  /* first frequency of the Euler-Bernoulli beam, Hz */
   double frequency() const
   {
     const double k = 1.875104068711961 / beam.length;
@@ -34,12 +34,12 @@ struct Settings {
 };
 
 struct Deflection {
-  double along, across; /* of the tip, in parts of the length */
+  double along, across; /* displacement of the tip, relative to the length */
 };
 
 /*
   The elastica: theta'' = -a cos theta, theta(0) = 0, theta'(1) = 0, in units of the length, a = P L^2/EI. Shooting for
-  the curvature at the root by bisection: it is the least that has theta' = 0 at the tip.
+  the curvature at the root by bisection: it is the smallest curvature for which theta' = 0 at the tip.
 */
 static Deflection Elastica(double a)
 {
@@ -121,7 +121,7 @@ struct Cantilever {
   }
 };
 
-/* The scene's static equilibrium, looked at after a first step */
+/* Reads the static equilibrium of the scene after a first step */
 static PetscErrorCode Static(const Settings &s, const FeModel &model, Kind kind, double force, Result *r)
 {
   Cantilever          c;
@@ -131,8 +131,8 @@ static PetscErrorCode Static(const Settings &s, const FeModel &model, Kind kind,
   PetscFunctionBeginUser;
   PetscCall(c.build(s, model, kind, force));
   c.scene.start().equilibrium = true;
-  /* The search goes by the masses of bodies, and a model has none for it. Without gravity this one makes no difference.
-   */
+  /* The search for equilibrium uses the masses of bodies, and a whole finite-element model has no such mass. This body provides one; without
+     gravity it has no effect on the equilibrium. */
   RigidBody pan;
   pan.mass     = s.beam.material.density * s.beam.area() * s.beam.length;
   pan.inertia  = pan.mass * s.beam.area() * Matrix3::Identity();
@@ -163,7 +163,7 @@ static double FrequencyOf(const std::vector<double> &t, const std::vector<double
   return count > 0 ? count / (last - first) : 0;
 }
 
-/* The load comes at once, and the beam swings about the deflection that it makes */
+/* The load is applied suddenly, and the beam swings about its static deflection */
 static PetscErrorCode Swing(const Settings &s, const FeModel &model, Kind kind, double force, Result *r)
 {
   Cantilever          c;

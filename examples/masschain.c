@@ -67,7 +67,7 @@ static PetscErrorCode Create(PetscInt n, Chain *chain)
   PetscFunctionReturn(0);
 }
 
-/* x_i = sin(i k pi / n) cos(omega t), omega = 2 sin(k pi / (2 n)); what holds the last mass is the force of its spring, x_{n-1} */
+/* x_i = sin(i k pi / n) cos(omega t), omega = 2 sin(k pi / (2 n)); the force that holds the last mass is that of its spring, x_{n-1} */
 static PetscErrorCode Exact(PetscInt n, PetscInt mode, PetscReal t, Vec U)
 {
   const PetscReal angle = mode * PETSC_PI / n, now = PetscCosReal(2 * PetscSinReal(angle / 2) * t);
@@ -125,7 +125,7 @@ int main(int argc, char **argv)
   PetscCall(MatDuplicate(chain.K, MAT_COPY_VALUES, &J));
   PetscCall(VecDuplicate(chain.M, &U));
   PetscCall(VecDuplicate(U, &V)); /* at rest */
-  PetscCall(Exact(n, mode, 0, U)); /* of the multiplier any value would do */
+  PetscCall(Exact(n, mode, 0, U)); /* the initial value of the multiplier does not matter */
   PetscCall(TSCreate(PETSC_COMM_WORLD, &ts));
   PetscCall(TSSetType(ts, TSHHT3));
   PetscCall(TSSetI2Function(ts, NULL, Residual, &chain));

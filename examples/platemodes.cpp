@@ -29,7 +29,7 @@ struct Plate {
   Material material{2.1e11, 0.3, 7850};
 };
 
-/* A mode of theory: half waves along x and y, and its frequency in Hz after Mindlin and Kirchhoff */
+/* A mode of plate theory: half waves along x and y, and frequencies in Hz by Mindlin and by Kirchhoff */
 struct Mode {
   const char *kind;
   int         m, n;
@@ -74,7 +74,7 @@ static PetscErrorCode MakeMesh(const Plate &p, std::string *file)
   PetscFunctionReturn(0);
 }
 
-/* Degrees of freedom of this rank that may move. A simply supported side does not move in its own plane. */
+/* Degrees of freedom of this rank that are not supported. Nodes of a simply supported side do not move in the plane of that side. */
 static std::vector<PetscInt> FreeRows(const FeModel &model, const Plate &p)
 {
   std::vector<bool> held(3 * model.own, false);
@@ -93,7 +93,7 @@ static std::vector<PetscInt> FreeRows(const FeModel &model, const Plate &p)
 
 /* ---- frequencies ---- */
 
-/* Lowest frequencies in Hz, Krylov-Schur with shift-and-invert; those of rigid motions are counted only */
+/* Lowest frequencies in Hz, by Krylov-Schur with shift-and-invert; rigid motions are only counted */
 static PetscErrorCode Frequencies(const FeModel &model, const std::vector<PetscInt> &rows, double shift, PetscInt count,
                                   std::vector<double> *hertz, PetscInt *rigid)
 {
@@ -258,7 +258,7 @@ static PetscErrorCode Run(void)
   PetscCall(PetscTime(&read));
   if (own_mesh && rank == 0) std::remove(mesh.c_str());
 
-  /* The shift: below zero, small against the first eigenvalue of a bending plate */
+  /* The shift is negative, and small compared with the first eigenvalue of a bending plate */
   double box[6] = {PETSC_MAX_REAL, PETSC_MAX_REAL, PETSC_MAX_REAL, PETSC_MAX_REAL, PETSC_MAX_REAL, PETSC_MAX_REAL};
   for (PetscInt i = 0; i < 3 * model.own; i++) {
     box[i % 3]     = std::min(box[i % 3], model.coordinates[i]);

@@ -25,7 +25,7 @@ std::vector<double> Problem::equallySpaced(int intervals) const
 namespace
 {
 
-/* What the callbacks of a TS need; one per TS, destroyed with it */
+/* Data for the callbacks of a TS; one per TS, destroyed with it */
 struct Adaptor {
   explicit Adaptor(const Problem &p) : problem(&p) {}
 
@@ -50,7 +50,7 @@ PetscErrorCode AdaptorFree(Adaptor *ad)
 #if PETSC_VERSION_LT(3, 23, 0)
 PetscErrorCode AdaptorDestroy(void *ctx) { return AdaptorFree(static_cast<Adaptor *>(ctx)); }
 #else
-/* The address of the context, a void ** until 3.24 and a void * after that: PETSc's prototype takes the one that fits. */
+/* PETSc passes the address of the context, as void ** up to 3.24 and as void * in later versions; each prototype takes the function that fits. */
 PetscErrorCode AdaptorDestroy(void **ctx) { return AdaptorFree(static_cast<Adaptor *>(*ctx)); }
 [[maybe_unused]] PetscErrorCode AdaptorDestroy(void *ctx) { return AdaptorDestroy(static_cast<void **>(ctx)); }
 #endif
@@ -115,7 +115,7 @@ PetscErrorCode I2Function(TS, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx
   PetscFunctionReturn(0);
 }
 
-/* A matrix that is not ours, such as a duplicate, has the pattern but not the map from entries to it */
+/* A matrix that CreateMatrix() did not make, such as a duplicate, has the pattern, but not the COO map from entries to values */
 PetscErrorCode SetValuesOneByOne(const Entries &e, Mat P)
 {
   PetscInt first, end;
@@ -298,7 +298,7 @@ PetscErrorCode GatherAll(Vec x, std::vector<double> &whole)
   PetscFunctionReturn(0);
 }
 
-/* A NaN in the computed value must show as NaN, one in the reference says that nothing is known */
+/* A NaN in the computed value makes the error NaN; a NaN in the reference means that the value is unknown */
 void Include(double computed, double ref, double scale, double &error)
 {
   if (std::isnan(ref) || std::isnan(error)) return;
@@ -354,7 +354,7 @@ PetscErrorCode ProblemReport(TS ts, const Problem &problem, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* -ts_exact_final_time interpolate leaves them at the end of the last step */
+/* -ts_exact_final_time interpolate interpolates U, but leaves velocities at the end of the last step */
 static PetscErrorCode VelocitiesOfTheSameTime(TS ts, Vec V)
 {
   PetscReal end, reached;

@@ -67,18 +67,17 @@ struct Problem {
   virtual void jacobian(double t, const double *u, const double *v, const double *a, double sv, double sa,
                         Entries &J) const = 0;
 
-  /* The exact or tabulated solution at t; what is not known is NaN. Returns false where there is none. */
+  /* The exact or tabulated solution at t; unknown components are NaN. Returns false if there is no solution at t. */
   virtual bool reference(double, double *, double *, double *) const { return false; }
 
-  /* Times at which reference() gives a solution, t0 first; a problem with an exact solution gives it at any other time
-   * too */
+  /* Times at which reference() gives a solution, t0 first; a problem with an exact solution gives it at other times, too */
   virtual std::vector<double> referenceTimes() const { return {}; }
 
   /* True if reference() answers at any time between t0 and t1 */
   virtual bool referenceEverywhere() const { return false; }
 
 protected:
-  /* For reference(): everything unknown */
+  /* For reference(): sets all values to NaN (unknown) */
   void setUnknown(double *u, double *v, double *a) const;
   /* For referenceTimes() of a problem with an exact solution: t0, t1 and n - 1 times between */
   std::vector<double> equallySpaced(int intervals) const;
@@ -94,10 +93,10 @@ struct ProblemErrors {
 PetscErrorCode ProblemCreateTS(MPI_Comm, const Problem &, TS *, Vec *U, Vec *V, bool setRoles = false);
 PetscErrorCode ProblemComputeErrors(PetscReal t, const Problem &, Vec U, Vec V, ProblemErrors *);
 PetscErrorCode ProblemReport(TS, const Problem &, Vec U, Vec V);
-/* From t0 to t1 on all ranks by TSHHT3, at this relative and absolute tolerance unless options say otherwise, and its errors */
+/* Integrates from t0 to t1 by TSHHT3 on all ranks, with this relative and absolute tolerance unless options set others, and prints the errors */
 PetscErrorCode ProblemSolve(const Problem &, PetscReal tolerance);
 
-/* Makes -ts_hhtdae_summary the default of a program; the user's own value of the option wins */
+/* Makes -ts_hhtdae_summary the default of a program; a value given by the user overrides it */
 PetscErrorCode SummaryByDefault(void);
 
 } // namespace hhtex

@@ -51,7 +51,7 @@ struct QuarterCar {
   }
 };
 
-/* Mean square of the body's acceleration, and the time that the tire is in the air */
+/* Mean square of the body's acceleration, and the time during which the tire does not touch the road */
 struct Verdict {
   double square = 0, air = 0, last = 0;
 };

@@ -35,8 +35,8 @@ struct RollingBall {
 };
 
 /*
-  About its centre a thin disc has the moments C = m r^2/2, about the axis, and A = C/2. With lean s towards the middle
-  of the circle of radius R, the balance of moments at the turning rate W gives  W^2 ((3/2) R + (r/4) sin s) = g tan s.
+  The moments of inertia of a thin disc about its centre are C = m r^2/2 about the axis and A = C/2 perpendicular to it. With a lean s towards
+  the middle of the circle of radius R, the balance of moments at the turning rate W is W^2 ((3/2) R + (r/4) sin s) = g tan s.
 */
 struct LeaningDisc {
   static constexpr double mass = 2, r = 0.5, g = 9.81;

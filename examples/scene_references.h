@@ -1,6 +1,6 @@
 /*
-  What the scenes of the examples are compared with: the same mechanisms in as few coordinates as they have degrees of
-  freedom, derived apart from the scene library and integrated by extrapolation of order 20.
+  References for the scenes of the examples: the same mechanisms in minimal coordinates, derived independently of the scene library and
+  integrated by extrapolation of order 20.
 */
 #ifndef HHTEX_SCENE_REFERENCES_H
 #define HHTEX_SCENE_REFERENCES_H
@@ -103,7 +103,7 @@ private:
     s(a) + s(b) + s(a) s(b) = 0,   s = sin
 
   closes the loop (Chen, You, Tarnai: Threefold-symmetric Bricard linkages for deployable structures, 2005, for twists
-  of 90 degrees, from the cube's angles). The equations of the open chain in (a, b) with that constraint, reduced to
+  of 90 degrees, from the cube's angles). The equations are those of the open chain in (a, b) with this constraint, reduced to
   index 1.
 */
 class BricardReference

@@ -1,5 +1,5 @@
-/* Looks at a scene's channels in the course of a run: f(t, values) at the multiples of dt within its steps, on every
-   rank. A run that goes on from a checkpoint is looked at from there. */
+/* Calls f(t, values) with the values of a scene's channels at the multiples of dt during a run, on every rank; in a run that is resumed from a
+   checkpoint, from the time of the checkpoint on. */
 #ifndef HHTEX_SCENE_WATCH_H
 #define HHTEX_SCENE_WATCH_H
 
@@ -28,7 +28,7 @@ private:
   PetscInt       done_  = 0;
   bool           begun_ = false;
 
-  /* Values of the start are those of the first step's beginning, where accelerations and multipliers are consistent. */
+  /* The values at the start are taken from the beginning of the first step, where accelerations and multipliers are consistent. */
   static PetscErrorCode monitor(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
   {
     Watch              *w = static_cast<Watch *>(ctx);
@@ -50,7 +50,7 @@ private:
   }
 };
 
-/* The largest of |a - b|; stays NaN once it was */
+/* Updates the largest |a - b|; once it is NaN, it stays NaN */
 inline void Widen(double &worst, double a, double b = 0)
 {
   const double d = std::fabs(a - b);

@@ -55,7 +55,7 @@ struct SpatialSliderCrank {
   }
 
 private:
-  /* axes with z along the first and x along the second of two directions across each other */
+  /* axes with z along the first and x along the second of two perpendicular directions */
   static hhtdae::Matrix3 Axes(const hhtdae::Vector3 &z, const hhtdae::Vector3 &x)
   {
     hhtdae::Matrix3 R;

@@ -25,7 +25,7 @@ static char help[] =
 
 using namespace hhtdae;
 
-/* Deflection across of a linear beam with the centrifugal force's stiffening, 8 modes, 5 digits */
+/* Transverse deflection of a linear beam with centrifugal stiffening, 8 modes, 5 digits */
 struct Point {
   double t, y;
 };
@@ -33,7 +33,7 @@ static const Point reference[] = {{2, -.10238},    {4, -.34239}, {5, -.46878}, {
                                   {6.75, -.57436}, {7, -.57184}, {8, -.54320}, {10, -.36284},
                                   {12, -.15084},   {15, .00130}, {18, -.00208}};
 
-/* Steady extension of a bar in rotation */
+/* Steady extension of a rotating bar */
 static double ExactExtension(const hhtex::SolidBeam &b)
 {
   const double aL = hhtex::spin_speed * b.length * std::sqrt(b.material.density / b.material.young);
@@ -150,7 +150,7 @@ static PetscErrorCode Table(const Settings &s, const std::vector<Curve> &curves)
   PetscFunctionReturn(0);
 }
 
-/* Mean of the last samples in steady rotation, which the remaining vibration swings about */
+/* Mean of the last samples in steady rotation: the value about which the remaining vibration oscillates */
 static PetscErrorCode Extension(const Settings &s, const std::vector<Curve> &curves)
 {
   const double exact = ExactExtension(s.arm);

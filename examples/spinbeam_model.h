@@ -13,8 +13,8 @@
 namespace hhtex
 {
 
-/* EA = 2.8e7, EI = 1.4e4, mass 1.2 per length: a square section. G A_s is 1.17e7 where the source has 1e7, which moves
-   the tip by 1e-5 of its deflection; so there is no lateral contraction, which a clamped end would hinder. */
+/* A square section with EA = 2.8e7, EI = 1.4e4 and mass 1.2 per length. nu = 0, because a clamped end would hinder lateral contraction; then
+   G A_s is 1.17e7 instead of 1e7 as in the source, which changes the tip's deflection by 1e-5 of its value. */
 inline SolidBeam SpinningArm()
 {
   SolidBeam b;
@@ -36,7 +36,7 @@ inline hhtdae::TimeFunction::Value SpinAngle(double t)
           spin_speed / spin_ramp * (t - std::sin(w * t) / w), spin_speed / spin_ramp * (1 - std::cos(w * t))};
 }
 
-/* The hub that carries the root and turns; channels x, y: the tip as the hub sees it */
+/* Adds the rotating hub, to which the root is fixed; channels x, y: position of the tip relative to the hub */
 inline void SpinUp(hhtdae::Scene &scene, const BeamEnds &ends)
 {
   using namespace hhtdae;

@@ -125,7 +125,7 @@ private:
   void setReactions(const Lean &p, double *u) const
   {
     const long double ax = p.ddx(), ay = p.ddy();
-    const long double endY   = (ay + g) / 2.L; /* a coupler does not turn: its ends carry the same vertical force */
+    const long double endY   = (ay + g) / 2.L; /* couplers do not rotate: both ends carry the same vertical force */
     long double       rightX = 0.L;            /* horizontal force on the previous coupler's right end */
     for (PetscInt i = 0; i <= windows; i++) {
       const long double topY  = -endY * ((i > 0) + (i < windows));

@@ -1,5 +1,5 @@
 /*
-  Planar rigid bodies with three coordinates (x, y, phi) each, pinned together: what fourbar.h and chain.h share.
+  Planar rigid bodies with three coordinates (x, y, phi) each, pinned together; used by fourbar.h and chain.h.
 
   A pin makes two points meet, Phi = r_P + A(phi_P) s_P - r_Q - A(phi_Q) s_Q = 0, and costs two multipliers: -lambda is
   the force on P's body, +lambda the one on Q's.

@@ -7,10 +7,10 @@
                   V/r, b itself appears nowhere
     multipliers   of the two conditions that the wheels touch; minus the test set's, in N
 
-  The contact points, which the test set has as four more unknowns, follow in closed form from the tangent planes. What holds for the
-  one wheel holds for the other, with the inclination of the contact plane taken in the same sense.
+  The contact points, four more unknowns in the test set, follow in closed form from the tangent planes. The same formulas hold for both
+  wheels, with the inclination of the contact plane taken in the same sense.
 
-  Reference at t = 10: the test set's (DASSL at 1e-9). Its initial values have five digits; those here agree with them and lie on
+  Reference at t = 10: the test set's (DASSL at 1e-9). Its initial values have five digits; those here agree with them and satisfy
   the constraints.
 */
 #ifndef HHTEX_WHEELSET_H
@@ -77,7 +77,7 @@ private:
   const double mass = 16.08, gravity = 9.81, speed = 30., radius = 0.1, I1 = 0.0605, I2 = 0.366, friction = 0.12, arm = 0.19, stiffness = 6400.;
   const double cone = 0.0262, half = 0.1506, rail = 0.06; /* inclination of the cones, half of the distance of the wheels, radius of the rails' profile */
 
-  /* One wheel and what it says of the axle */
+  /* Geometry of one wheel's contact, as a function of the axle's coordinates */
   template <class T> struct Side {
     T q[5];         /* gradient of the condition that it touches, by x, y, z, theta, phi */
     T sin_d, cos_d; /* of the inclination of the contact plane */
@@ -102,8 +102,8 @@ private:
     explicit Axle(const T *u) : st(sine(u[Theta])), ct(cosine(u[Theta])), sp(sine(u[Phi])), cp(cosine(u[Phi])) {}
   };
 
-  /* Geometry of a wheel, sign = 1 on the left and -1 on the right. The normals of wheel and rail are parallel: along the track that gives psi, across it the slope
-     of the rail, with that the place on the rail, and so the one on the wheel. */
+  /* Geometry of a wheel, sign = 1 on the left and -1 on the right. The normals of wheel and rail are parallel. Their components along the track
+     give psi; those across it give the slope of the rail, from which the contact points on rail and wheel follow. */
   template <class T> Side<T> touch(const T *u, const Axle<T> &k, double sign) const
   {
     using std::asin;
