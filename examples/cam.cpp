@@ -2,7 +2,7 @@ static char help[] = "A cam lifts a follower against a spring: which force keeps
                      "the follower jump off?\n"
                      "Kinematics and inverse dynamics by calls, without a run in time, against closed forms.\n"
                      "  -points <180>: positions of a turn\n"
-                     "  -speeds <6>: of the shaft, from 300 revolutions per minute on\n";
+                     "  -speeds <6>: number of speeds of the shaft, from 300 revolutions per minute on\n";
 
 #include "problem.h"
 

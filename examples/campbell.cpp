@@ -1,7 +1,7 @@
 static char help[] = "Campbell diagram of a disc at the end of an elastic shaft: natural frequencies against speed, beside Stodola's equation\n"
                      "  [12 EI/L^3 - m w^2, -6 EI/L^2; -6 EI/L^2, 4 EI/L - It w^2 + Ip speed w],\n"
-                     "and how far the disc goes round under a force that turns with it, an unbalance.\n"
-                     "  -speeds <7>: of them, from 0 to -fastest <6000> revolutions per minute\n"
+                     "and the amplitude of the disc's whirl under an unbalance.\n"
+                     "  -speeds <7>: number of speeds, from 0 to -fastest <6000> revolutions per minute\n"
                      "  -unbalance <1e-4>: kg m\n"
                      "  a picture: build/bin/campbell -speeds 61 > campbell.txt; gnuplot -p -e \"plot for [k=2:5] 'campbell.txt' using 1:k with lines\"\n"
                      "  -film PREFIX: the first mode at the highest speed, for ParaView\n";

@@ -1,5 +1,5 @@
 static char help[] =
-    "A chain of N bodies, or a net with closed loops, falls from the horizontal; how much work a body makes.\n"
+    "A chain of N bodies, or a net with closed loops, falls from the horizontal; for timing the work per body.\n"
     "Runs on any number of ranks with the same result.\n"
     "  -n <10>: number of rods, 1 kg and 1 m each\n"
     "  -joint <revolute>: revolute, about z, or spherical\n"

@@ -1,10 +1,10 @@
 static char help[] =
     "Pendulum with a flexible arm: a plate with a hole, meshed by gmsh, reduced, saved, loaded, swinging; stress out.\n"
     "The arm is 1 m long, of aluminium; a block is welded to its tip; it is let go where it is horizontal.\n"
-    "  -modes <4>[,<12>,...]: normal modes of the reduction; with several, each is run, the last one tells of stress\n"
+    "  -modes <4>[,<12>,...]: normal modes of the reduction; a run for each number, the last one with stress\n"
     "  -size <0.02> -thickness <0.005>: of the mesh's elements, of the plate, m\n"
     "  -tip <0.2>: mass of the block, kg;  -speed <0>: of the arm at the start, rad/s\n"
-    "  -end <1> -samples <500>: end time, s; times at which results are looked at\n"
+    "  -end <1> -samples <500>: end time, s; number of times at which results are recorded\n"
     "  -o <file.h5>: keeps the reduced body;  -save_mesh <file.msh>: the mesh, for hhtreduce\n"
     "  -body <file.h5>: takes the body of such a file, by this program or by\n"
     "      hhtreduce -mesh arm.msh -material 7e10,0.33,2700\n"

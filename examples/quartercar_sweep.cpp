@@ -1,6 +1,6 @@
 static char help[] = "Quarter car over a curb, run after run with another damper and another spring: which suspension is comfortable, and "
                      "keeps the tire on the road?\n"
-                     "The scene is described once; what may change has a name.\n"
+                     "The scene is described once; quantities that change from run to run are parameters.\n"
                      "  -runs <12>: dampers to try, from 500 to 4000 N s/m, each with three springs\n"
                      "  -end <1>: end time, s\n";
 
