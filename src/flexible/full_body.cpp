@@ -222,7 +222,8 @@ PetscErrorCode CheckRanks(const Scene &scene, const std::string &name, const FeM
   PetscFunctionReturn(0);
 }
 
-/* A mesh of several parts may be meant; coincident nodes that were not merged are not, and a part that falls away would be seen in pictures alone */
+/* Reports a mesh of several unconnected parts. This may be intended, or coincident nodes were not merged; then a part would fall off, which
+   only pictures show. */
 PetscErrorCode TellParts(const FullExtension &x)
 {
   const FeModel    &m = *x.model;
@@ -230,7 +231,7 @@ PetscErrorCode TellParts(const FullExtension &x)
   std::string       parts;
   PetscFunctionBegin;
   if (!m.K) PetscFunctionReturn(0);
-  for (const TieNodes &t : x.ties) { /* whether rigid or on average, an attachment holds its nodes */
+  for (const TieNodes &t : x.ties) { /* both kinds of ties connect the nodes of an attachment */
     tied.emplace_back();
     tied.back().tie = Tie::Rigid;
     for (PetscInt n : t.node)
@@ -283,13 +284,15 @@ PetscErrorCode FullFeBody::add(Scene &scene, const std::string &given, const FeM
   std::vector<Vector3> point(body.attachments.size());
   for (std::size_t i = 0; i < point.size(); i++) PetscCall(MakeTie(*x, body.attachments[i], &point[i]));
   PetscCall(TellParts(*x));
-  /* nothing fails from here on: a faulty description has left nothing in the scene, and one that is recorded can be repeated with other parameters */
+  /* No error occurs below: a faulty description returns above, before it has changed the scene, and a recorded one can be repeated when
+     parameters change */
   SceneAccess::record(scene, [=, &model](Scene &s) {
     if (FullFeBody().add(s, name, model, body)) DataOf(s).errors.push_back("finite-element body " + name + " could not be added anew");
   });
   DataOf(scene).refuseLate("finite-element body " + name);
   const double extent = (corner[1] - corner[0]).norm();
-  /* corners of the bounding box as markers: a scene takes its size from bodies and markers, and would know only the attachments of this body */
+  /* Adds the corners of the bounding box as markers: a scene computes its size from bodies and markers, which would include only the
+     attachments of this body */
   for (const Vector3 &c : corner) DataOf(scene).markers.push_back({-1, x->placed(c.data()), Matrix3::Identity()});
   for (std::size_t i = 0; i < point.size(); i++) {
     const std::string &attachment = body.attachments[i].name;

@@ -273,9 +273,11 @@ void EraseFrom(PetscReal value, std::vector<Mode> *modes)
   modes->erase(std::remove_if(modes->begin(), modes->end(), [&](const Mode &m) { return std::abs(m.value) >= value; }), modes->end());
 }
 
-/* A search is accurate for values up to max_value_per_shift times the shift. If it has found faster ones, another search follows about a shift that near
-   to the fastest. Modes too slow for the new shift are kept from the search before, and treated in the same way, if both searches agree on their number. If not, all results of the search
-   before are discarded: rounding of fast modes creates spurious rigid motions, the more the farther these are from the shift (SmallBodies.SlowestModesOfAFreeBody). */
+/* A search is accurate for values up to max_value_per_shift times the shift. If it has found faster modes, the search is repeated about a shift
+   of the fastest value divided by max_value_per_shift. Modes too slow for the new shift are taken from the previous search if both searches
+   agree on their number, and the loop continues with these. If they disagree, all results of the previous search are
+   discarded: rounding of fast modes creates spurious rigid motions, the more the farther these are from the shift
+   (SmallBodies.SlowestModesOfAFreeBody). */
 PetscErrorCode SearchRepeatedly(const Mat given[3], PetscReal shift, PetscInt count, SearchResult *found)
 {
   std::vector<Mode> slow, &all = found->modes;

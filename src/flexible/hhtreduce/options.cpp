@@ -41,25 +41,25 @@ const char *const help =
     "\n"
     "Reduction\n"
     "  -method <craigbampton>   craigbampton, freefree or static\n"
-    "  -modes <20>              normal modes, at most\n"
-    "  -max_frequency <f>       of normal modes, cycles per unit of time; without -modes: all below it\n"
-    "  -keep_below <f>          modes of the reduced body that are kept, by frequency\n"
-    "  -keep <0,1,5-9>          the same by number from 0\n"
+    "  -modes <20>              largest number of normal modes\n"
+    "  -max_frequency <f>       highest frequency of normal modes, cycles per unit of time; without -modes: all below it\n"
+    "  -keep_below <f>          keeps the modes of the reduced body below this frequency\n"
+    "  -keep <0,1,5-9>          keeps the modes of the reduced body with these numbers, from 0\n"
     "  -stiffening              geometric stiffening by loads on the attachments and by angular velocity\n"
     "  -keep_nodes <set,17,20-30,...>\n"
     "                           nodes for markers, forces and contact of a scene: of sets and by number\n"
     "  -pressure <name:set[:follows|:fixed],...>\n"
-    "                           load case: pressure one, inwards, on the outer faces whose nodes are all in the set; it follows the "
+    "                           load case: unit pressure, inwards, on the outer faces whose nodes are all in the set; it follows the "
     "deformed\n"
     "                           surface, or its forces are fixed in the axes of the body\n"
     "  -load <name:file,...>    load case: forces on nodes, lines \"label fx fy fz\"\n"
-    "  -stress                  stress modes too, for stress over time and pictures\n"
-    "  -no_shapes               the file is for scenes alone: no nodes, no pictures\n"
+    "  -stress                  adds stress modes, for stress over time and pictures\n"
+    "  -no_shapes               writes only what scenes need: no nodes, no pictures\n"
     "\n"
     "The file\n"
     "  -o <body.h5>             where the reduced body goes (HDF5)\n"
-    "  -units <text>            for the reader, as \"m, kg, s\"; any consistent units serve\n"
-    "  -name <text>             of the body; the output's name without its ending if left out\n"
+    "  -units <text>            a note in the file, such as \"m, kg, s\"; any consistent units may be used\n"
+    "  -name <text>             name of the body; default: the output's name without its ending\n"
     "  -quiet                   no progress, no table\n"
     "\n"
     "A body's file\n"
@@ -74,18 +74,18 @@ const char *const help =
     "\n"
     "  -traceback               errors with PETSc's trace of calls\n"
     "\n"
-    "Solvers: options of PETSc and SLEPc with the prefix reduce_, which -help with a task lists but for the last four\n"
+    "Solvers: options of PETSc and SLEPc with the prefix reduce_, which -help with a task lists, except the last four\n"
     "  -reduce_eps_type, -reduce_eps_tol <1e-11>, -reduce_eps_max_it <200>, -reduce_eps_ncv, ...\n"
     "                           of normal modes\n"
     "  -reduce_ksp_type, -reduce_pc_type, -reduce_pc_factor_mat_solver_type, ...\n"
     "                           of constraint modes and residuals; the default is L D L^T by MUMPS\n"
     "  -reduce_eps_krylov_block <6>\n"
-    "                           vectors at a time of the block Krylov method, the default for normal modes\n"
+    "                           vectors in a block of the block Krylov method, the default for normal modes\n"
     "  -reduce_slices_from <400>\n"
-    "                           modes below -max_frequency from which on they are found by intervals of frequencies\n"
+    "                           with at least so many modes below -max_frequency, these are computed by intervals of frequencies\n"
     "  -reduce_verify <true>    counts modes by the inertia of a matrix, so that none of several equal ones is missing\n"
     "  -fe_mass_points <exact>  of meshes: exact, or stiffness, the points at which the stiffness is integrated\n"
-    "All other options of PETSc are alive (-log_view, -options_left ...).\n"
+    "All other options of PETSc can be used (-log_view, -options_left ...).\n"
     "\n"
     "Layout of the file (HDF5, little-endian, format \"hhtdae reduced body\" version 4; n modes, a attachments, N "
     "nodes, S nodes with stress)\n"
@@ -339,7 +339,7 @@ Arguments::Arguments(int argc, char **argv)
     else if (Contains(without_value, word.substr(1)) &&
              (!value || (std::strcmp(argv[i + 1], "0") && std::strcmp(argv[i + 1], "1") &&
                          std::strcmp(argv[i + 1], "true") && std::strcmp(argv[i + 1], "false"))))
-      words.push_back("true"); /* else PETSc takes the next word, a file's name, for its value */
+      words.push_back("true"); /* otherwise PETSc would take the next word, the name of a file, for the option's value */
     else if (Contains(without_value, word.substr(1)))
       words.push_back(argv[++i]);
   }
@@ -375,7 +375,7 @@ PetscErrorCode ReadTask(const Arguments &arguments, Task *t)
   PetscCheck(t->kind != Task::ReduceModel || arguments.positional.empty(), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "\"%s\" belongs to no option; hhtreduce -help explains them", arguments.positional.c_str());
   PetscCall(PetscOptionsHasHelp(nullptr, &asked));
-  if (asked && t->kind == Task::None) PetscFunctionReturn(0); /* PETSc has answered */
+  if (asked && t->kind == Task::None) PetscFunctionReturn(0); /* PETSc has printed the help */
   PetscCheck(t->kind != Task::None, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "nothing to do: give a model (-mesh, -calculix, -stiffness and -mass), -info or -vtu; hhtreduce -help "
              "explains them");
