@@ -29,9 +29,9 @@
 namespace hhtdae
 {
 
-/* Moves the run to static equilibrium at time t, at rest: the equilibrium downhill from the present state, or nearest to it. Motions are held at
-   their values at t; rates of first-order states are zero, and states that nothing reads keep their values. With motions of velocities
-   or accelerations that are not zero at t there is no equilibrium. */
+/* Moves the run to static equilibrium at time t, at rest: the equilibrium that a descent from the present state reaches, or the nearest one.
+   Motions are held at their values at t; rates of first-order states are zero, and states that nothing reads keep their values. With motions
+   of velocities or accelerations that are not zero there is no equilibrium. */
 PetscErrorCode StaticEquilibrium(TS ts, PetscReal t);
 
 /* Moves the run to the nearest positions and velocities, in the metric of the masses, that satisfy all constraints and motions at time t.

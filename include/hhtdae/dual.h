@@ -14,7 +14,7 @@
     abs at 0, hypot at the origin                        0, the mean of both sides
     atan2 at the origin                                  not a number
     min and max of equal values                          that of the first argument
-  Where the argument's derivative is exactly 0, the result's derivative is 0 even there: sqrt(x*x) at 0 has derivative 0.
+  A component of the derivative that is exactly 0 in the argument is 0 in the result, even there: sqrt(x*x) at 0 has derivative 0.
     pow(x, p)   with a constant p is defined at x < 0 for integer p, at x = 0 with derivative p 0^(p-1), and is 1 for p = 0
     pow(x, y)   with a variable y: d/dy = x^y log x; it is 0 at x = 0 for y > 0, and not a number at x < 0
 */

@@ -26,9 +26,9 @@
 
   A swinging rod is not steady in any axes. In such a state modes() and stateSpace() describe the rates of small motions at this time,
   including the change of constraints along the motion: A is the derivative of (z', z'') by (z, z'), where z are coordinates along the
-  directions that constraints leave free, orthonormal in the metric of the masses. For a single degree of freedom the result is that of motion along
-  its path at any speed: the rod has value^2 = -m g l cos(angle)/J. The sparse methods, response() and SlowestModes(), take constraints as
-  they are at this time; they are meant for equilibria and steady motions.
+  directions that constraints leave free, orthonormal in the metric of the masses. For a single degree of freedom the result is that of
+  motion along its path at any speed: the rod has value^2 = -m g l cos(angle)/J. The sparse methods, response() and SlowestModes(), take
+  constraints as they are at this time; they are meant for equilibria and steady motions.
   All calls are collective, with the same results on every rank. A linearization is valid as long as its TS exists.
 */
 #ifndef HHTDAE_LINEARIZE_H
