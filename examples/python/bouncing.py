@@ -1,7 +1,7 @@
-"""Contact: a ball that bounces on a plane, with the compression after Hertz's law.
+"""Contact: a ball that bounces on a plane, compared with Hertz's law.
 
-The contact law k d^(3/2) has no losses here: the deepest penetration is that where all energy is in the contact, (5 m v^2 / (4 k))^(2/5) but for the
-weight, and every rebound reaches the height of the start.
+The contact law k d^(3/2) has no losses here: at the deepest penetration all energy is in the contact, so that it is (5 m v^2 / (4 k))^(2/5) if the
+weight is neglected, and every rebound reaches the height of the start.
 """
 
 import hhtdae

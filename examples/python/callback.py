@@ -1,6 +1,6 @@
-"""A force that no formula gives: a Python function that the run calls, and what that costs.
+"""A force that is not given by a formula: a Python function that the run calls, and the cost of the calls.
 
-The law is a spring; the same run with the formula of the law shows the price of a call.
+The law is a spring; the same run with the law as a formula shows the cost.
 """
 
 import math
@@ -21,7 +21,7 @@ def oscillator(law):
 def main():
     calls = []
 
-    def spring(x):  # a table, a fitted network, another program
+    def spring(x):  # could be a table, a fitted network or another program
         calls.append(x)
         return -50 * x
 

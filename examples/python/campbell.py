@@ -1,4 +1,4 @@
-"""Campbell diagram: natural frequencies of a disc on an elastic shaft against its speed, beside Stodola's equation.
+"""Campbell diagram: natural frequencies of a disc on an elastic shaft against its speed, compared with Stodola's equation.
 
 python3 campbell.py -plot shows it.
 """

@@ -1,4 +1,4 @@
-"""A run that is saved in its middle and resumed by another program: the same bits."""
+"""A run that is saved halfway and resumed by another program, with the same bits as an uninterrupted run."""
 
 import os
 import tempfile

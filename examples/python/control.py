@@ -1,7 +1,7 @@
-"""A sampled controller: an inverted pendulum on a cart is held upright by a program that looks at it every 20 ms.
+"""A sampled controller: an inverted pendulum on a cart is held upright by a program that reads its state every 20 ms.
 
-Between samples the force is a parameter, which the run reads at every evaluation; the loop sets it. The gains follow from the linearization of the scene
-itself and SciPy's Riccati equation.
+The force is a parameter, constant between samples: the loop sets it, and the run reads it at every evaluation. The gains follow from the linearization of
+the scene and SciPy's solution of the Riccati equation.
 """
 
 import numpy as np

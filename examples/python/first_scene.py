@@ -1,6 +1,6 @@
 """A first scene: a rod on a pin, recorded channels, reactions, a plot.
 
-Compared with the balance of energy: what the centre of mass has lost in height.
+Compared with the balance of energy: the kinetic energy is the potential energy that the centre of mass has lost.
 """
 
 import sys

@@ -1,7 +1,7 @@
 """A flexible body: a finite-element model of a beam is reduced, clamped in a scene, loaded at its tip, and let go.
 
-Deflection, stress at the root's side and the frequency of what follows are compared with beam theory. Meshes come from Gmsh or any program that writes its
-files, matrices from CalculiX, from files or from memory: see hhtdae.flexible.FeModel.
+Deflection, stress at the surface near the root and the frequency of the free vibration are compared with beam theory. Meshes come from Gmsh or any
+program that writes its files, matrices from CalculiX, from files or from memory: see hhtdae.flexible.FeModel.
 """
 
 import os

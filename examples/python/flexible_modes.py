@@ -1,7 +1,7 @@
 """Modes and meshes as arrays: a free beam's frequencies, mode shapes, stress modes; a reduced body in a file.
 
-The shapes at the nodes are numpy arrays; with meshio installed, body.to_meshio(eta).write("mode.vtu") is a picture. Compared with beam theory (bending of a
-slender free beam after Euler and Bernoulli, and its stretching).
+The shapes at the nodes are numpy arrays; with meshio installed, body.to_meshio(eta).write("mode.vtu") writes a picture. Compared with beam theory
+(Euler-Bernoulli bending and stretching of a slender free beam).
 """
 
 import os

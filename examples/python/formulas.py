@@ -1,7 +1,7 @@
 """Forces, variables and states as formulas, which are written in Python and run in C++.
 
-A mass hangs on a spring that stiffens, F = k x + c x^3, against a damper whose characteristic was measured at a few points; a state collects the work
-that the damper has taken. Energy at the start = energy now + that work.
+A mass on a stiffening spring, F = k x + c x^3, with a damper whose characteristic was measured at a few points; a state integrates the work
+done on the damper. Energy at the start = energy now + this work.
 """
 
 import hhtdae

@@ -1,6 +1,5 @@
-"""A fast top in steady precession: spin w, lean th, turning rate W that solves  A W^2 cos(th) - C w W + m g l = 0  with C about the axis and A across it.
-
-Started with the smaller root the lean stays as it is.
+"""A fast top in steady precession with spin w, lean th and turning rate W, a root of  A W^2 cos(th) - C w W + m g l = 0  (moments of inertia C about the axis,
+A perpendicular to it). Started with the smaller root, the top keeps its lean.
 """
 
 import numpy as np
@@ -13,7 +12,7 @@ MASS, ARM, LEAN, SPIN, G = 0.5, 0.1, 0.5, 200., 9.81
 def main():
     J = hhtdae.inertia.disc(MASS, 0.05)
     C, A = J[2, 2], J[0, 0] + MASS * ARM**2
-    # With the spin w_3 about the axis (which includes the precession's part):
+    # SPIN is the angular velocity about the axis, including the component of the precession:
     W = np.roots([A * np.cos(LEAN), -C * SPIN, MASS * G * ARM]).min()
     axis = np.array([np.sin(LEAN), 0, np.cos(LEAN)])
     across = np.array([0, 0, W]) - axis * axis[2] * W

@@ -1,7 +1,7 @@
 """Optimization with SciPy: the damping with which a mass on a spring comes to rest soonest.
 
-The integral of the square of the displacement after a push, J = int x^2 dt from x = 0 at unit speed, with m = k = 1 is 1 / (4 z) for the damping ratio z.
-With a price on the damper's force, J + int (2 z x')^2 dt = 1 / (4 z) + z, the best ratio is 1/2.
+The integral of the squared displacement after a push, J = int x^2 dt from x = 0 at unit speed, with m = k = 1, is 1 / (4 z) for the damping ratio z.
+With a cost of the damper's force, J + int (2 z x')^2 dt = 1 / (4 z) + z, the best ratio is 1/2.
 """
 
 import hhtdae

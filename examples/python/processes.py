@@ -1,6 +1,6 @@
-"""A sweep on two processes: scenes go to those of a pool, runs come back as their results.
+"""A sweep on two processes: scenes are sent to the processes of a pool, which return runs as their results.
 
-A wagon runs into a buffer, a spring and a damper in its way from x = 0 on; the deepest point by damping, against the closed form.
+A wagon runs into a buffer, a spring and a damper that act from x = 0 on; the deepest compression for several dampings is compared with the closed form.
 """
 
 import math

@@ -1,6 +1,6 @@
-"""Which tolerance corresponds to what: a pendulum of 1 m, let go horizontally, for 5 s, against the exact solution, as the table of the README.
+"""Errors of a run by tolerance, the table of the README: a pendulum of 1 m, released from the horizontal, for 5 s, against the exact solution.
 
-The tolerance bounds what one step may miss in positions; what is printed is the largest error of the whole run over the largest value. The exact angle
+The tolerance bounds the error of positions in one step; the table has the largest error of the whole run over the largest value. The exact angle
 is 2 asin(k sn(w t + K, k)) with k = sin(45 deg), w = sqrt(g / L), and sn by descending arithmetic-geometric means (Abramowitz, Stegun, 16.4).
 """
 

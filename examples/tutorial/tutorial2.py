@@ -1,4 +1,4 @@
-"""Tutorial, step 2: what is recorded, what can be asked, what can be looked at."""
+"""Tutorial, step 2: recorded channels, questions to a run, pictures."""
 
 import sys
 

@@ -24,13 +24,13 @@ int main(int argc, char **argv)
     const Marker tip = scene.marker(rod, {0.5, 0, 0}), seat = scene.marker(base);
     connect<Revolute>(scene, "pin", rod, scene.ground(), {0, 0, 0}, {0, 0, 1});
 
-    /* the base goes to and fro along x by 0.1 m, beginning gently: a motion is a function of time */
+    /* the base oscillates along x by 0.1 m, with a smooth start: a motion is a function of time */
     const Matrix3 along = axesAlong({1, 0, 0});
     const Marker  moved = scene.marker(base, {0, 0, 0}, along), rail = scene.marker(scene.ground(), {0, 1, 0}, along);
     scene.add("guide", Translational{moved, rail});
     scene.add("drive", TranslationalMotion{moved, rail, TimeFunction::formula([](const auto &t) { return 0.1 * (1. - cos(6. * t)); })});
 
-    /* between tip and base a spring that stiffens, with a damper: tension as a function of length and rate */
+    /* a stiffening spring with a damper between tip and base: tension as a function of length and rate */
     scene.add("spring", NonlinearSpring{tip, seat, [](const Real &l, const Real &v) {
                                           const Real d = l - 1.2;
                                           return 40. * d + 200. * d * d * d + 1.5 * v;

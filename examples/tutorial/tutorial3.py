@@ -8,14 +8,14 @@ base = scene.rigid_body("base", mass=1, position=(0, 1, 0))
 tip, seat = rod.marker((0.5, 0, 0)), base.marker()
 scene.connect("pin", hhtdae.Revolute, rod, scene.ground, (0, 0, 0), axis=(0, 0, 1))
 
-# the base goes to and fro along x by 0.1 m, beginning gently: a motion is a function of time
+# the base oscillates along x by 0.1 m, with a smooth start: a motion is a function of time
 along = hhtdae.axes_along((1, 0, 0))
 moved, rail = base.marker(axes=along), scene.ground.marker((0, 1, 0), along)
 scene.add("guide", hhtdae.Translational(moved, rail))
 scene.add("drive", hhtdae.TranslationalMotion(moved, rail, lambda t: 0.1 * (1 - hhtdae.cos(6 * t))))
 
 
-# between tip and base a spring that stiffens, with a damper: tension as a function of length and rate
+# a stiffening spring with a damper between tip and base: tension as a function of length and rate
 def tension(l, v):
     d = l - 1.2
     return 40 * d + 200 * d**3 + 1.5 * v

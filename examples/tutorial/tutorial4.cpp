@@ -14,7 +14,7 @@ int main(int argc, char **argv)
   PetscCall(TSHHT3Initialize());
   {
     Scene           scene(PETSC_COMM_WORLD);
-    const Parameter k = scene.parameter("stiffness", 100); /* parameters come first */
+    const Parameter k = scene.parameter("stiffness", 100); /* parameters have to be defined first */
     scene.gravity({0, -9.81, 0});
     RigidBody bar;
     bar.mass       = 2;
@@ -23,7 +23,7 @@ int main(int argc, char **argv)
     const Body rod = scene.add("rod", bar);
     connect<Revolute>(scene, "pin", rod, scene.ground(), {0, 0, 0}, {0, 0, 1});
     const Marker tip = scene.marker(rod, {0.5, 0, 0}), hook = scene.marker(scene.ground(), {1, 1, 0});
-    scene.add("spring", [=] { return SpringDamper{tip, hook, k, 0.5, 0.8}; }); /* what depends on them is a function */
+    scene.add("spring", [=] { return SpringDamper{tip, hook, k, 0.5, 0.8}; }); /* elements that depend on them are described by a function */
 
     for (const double stiffness : {50., 100., 200.}) {
       TS                ts;

@@ -3,7 +3,7 @@
 import hhtdae
 
 scene = hhtdae.Scene(gravity=(0, -9.81, 0))
-k = scene.parameter("stiffness", 100)  # parameters come first
+k = scene.parameter("stiffness", 100)  # parameters have to be defined first
 rod = scene.rigid_body("rod", mass=2, inertia=hhtdae.inertia.box(2, (1, 0.05, 0.05)), position=(0.5, 0, 0))
 scene.connect("pin", hhtdae.Revolute, rod, scene.ground, (0, 0, 0), axis=(0, 0, 1))
 tip, hook = rod.marker((0.5, 0, 0)), scene.ground.marker((1, 1, 0))

@@ -18,7 +18,7 @@ int main(int argc, char **argv)
     Reduction   reduction;
     ReducedBody body;
     PetscCall(model.readMesh("beam.msh", {{"steel", Material{2.1e11, 0.3, 7850}}}));
-    reduction.attachments = {{"left"}, {"right"}}; /* sets of nodes that joints, forces and markers take hold of */
+    reduction.attachments = {{"left"}, {"right"}}; /* node sets at which joints, forces and markers act */
     reduction.modes       = 6;
     PetscCall(Reduce(model, reduction, &body));
     PetscCall(AddStressModes(model, &body));
@@ -44,10 +44,10 @@ int main(int argc, char **argv)
     PetscCall(scene.solve(ts));
 
     PetscCall(now.take(ts));
-    PetscCall(now.relativeMotion(tip, root, &bent)); /* the tip as somebody at the root sees it */
+    PetscCall(now.relativeMotion(tip, root, &bent)); /* position of the tip relative to the root */
     PetscCall(now.modes(rod, &eta));
     PetscCall(VonMises(body, Eigen::Map<Eigen::VectorXd>(eta.data(), (Eigen::Index)eta.size()), &stress));
-    double largest = 0; /* of this rank's nodes, then of all */
+    double largest = 0; /* over this rank's nodes, then over all */
     for (const double s : stress) largest = std::max(largest, s);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "at 0.5 s: deflection %.4f mm, largest stress %.4f MPa\n", 1e3 * bent.position(1), 1e-6 * largest));

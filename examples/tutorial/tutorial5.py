@@ -4,7 +4,7 @@ import hhtdae
 from hhtdae import flexible
 
 model = flexible.FeModel.from_mesh("beam.msh", {"steel": flexible.Material(2.1e11, 0.3, 7850)})
-# sets of nodes that joints, forces and markers take hold of
+# node sets at which joints, forces and markers act
 body = flexible.reduce(model, [flexible.Attachment("left"), flexible.Attachment("right")], modes=6, stress=True)
 print("first mode of the free strip: %.3f Hz" % body.frequencies[0])
 
@@ -18,6 +18,6 @@ tip, root = right.marker(), left.marker()
 run = scene.solve(0.5, tolerance=1e-7)
 
 now = run.snapshot()
-bent = now.relative_motion(tip, root).position  # the tip as somebody at the root sees it
+bent = now.relative_motion(tip, root).position  # position of the tip relative to the root
 stress = body.von_mises(now.modes(rod))
 print("at 0.5 s: deflection %.4f mm, largest stress %.4f MPa" % (1e3 * bent[1], 1e-6 * stress.max()))
