@@ -1,6 +1,6 @@
 """A flexible body: a finite-element model of a beam is reduced, clamped in a scene, loaded at its tip, and let go.
 
-Deflection, stress at the surface near the root and the frequency of the free vibration are compared with beam theory. Meshes come from Gmsh or any
+Deflection, stress at the surface halfway along the beam and the frequency of the free vibration are compared with beam theory. Meshes come from Gmsh or any
 program that writes its files, matrices from CalculiX, from files or from memory: see hhtdae.flexible.FeModel.
 """
 
