@@ -94,8 +94,9 @@ struct PredictorState {
   PetscReal t[max_degree + 2] = {}; /* t_n, t_{n-1}, ... */
 };
 
-/* Unknowns at the ends of the accepted steps. For first-order states the true derivative s' is kept: the error test uses it, and the algorithmic w_n
-   belongs to a time that depends on h. The algorithmic acceleration a_n does so, too, but is smoother than q'' and predicts better. */
+/* Unknowns at the ends of the accepted steps. For first-order states the true derivative s' is kept: the error test uses it, and the
+   algorithmic w_n belongs to a time that depends on h. The algorithmic acceleration a_n does so, too, but is smoother than q'' and
+   predicts better. */
 struct Predictor : PredictorOptions, PredictorState {
   Vec X[max_degree + 2] = {}; /* a, s', lambda, V, F at t[k], allocated when first used */
 };
@@ -209,7 +210,7 @@ enum class Ahead { Unknown, Nothing, Loads };
 /* The present step, and what is kept about the steps before it */
 struct StepState {
   PetscReal        t0 = 0, t1 = 0, h = 0; /* beginning, end and length of the present attempt, or of the last accepted step between steps */
-  PetscReal        h_last      = 0;       /* length of the step that led to t_n; 0 after a start */
+  PetscReal        h_last      = 0;       /* length of the step that led to t_n; after a start, of the first step */
   PetscReal        t_begin     = 0;       /* beginning of the run */
   TSStepStatus     status      = TS_STEP_INCOMPLETE;
   PetscBool        have_step   = PETSC_FALSE; /* U1, V1, A1, X hold an accepted step that has not been committed to U0, V0, A0, X0 yet */

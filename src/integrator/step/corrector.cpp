@@ -1,20 +1,20 @@
 /*
-  The corrector: a modified Newton iteration in SNES (iterate.cpp), stopped by its measured rate of convergence (judge.cpp), and the ladder
-  by which its matrix is reused.
+  The corrector: a modified Newton iteration in SNES (iterate.cpp), stopped by its measured rate of convergence (judge.cpp), and the rules
+  by which the Newton matrix is reused.
 
-  The ladder, from the cheapest rung:
-    reuse      as long as h is within a factor `ratio` of the matrix's own and the last correction went at a rate < slow_rate
-    renew      before a correction otherwise; within a correction when it is slow, a few times
-    retry      a correction that failed with an old matrix is repeated from the prediction with a new one, at the same h
-    start over at fixed steps, where h is not for us to cut: from where the step begins, where a prediction led astray
-    fail       with a matrix of this very correction: TSAdapt cuts h
-  Where old matrices fail again and again (a stiff direction that turns by more than 1/(h omega) in a step) reuse costs a
-  correction each time, and one that passes by chance after its first iteration may be far off: after a retry the next step
-  gets a new matrix, after the second retry the next two, then four, ... until a reused matrix holds.
-  A step size that would grow by less than `hold` is kept, so that the factorization lives on (adapt.cpp).
+  These are, from the cheapest to the most expensive:
+    reuse      while h is within a factor `ratio` of the h of the matrix and the last iteration converged at a rate < slow_rate
+    renew      otherwise, before the iteration; also within an iteration that is slow, at most max_renewals times
+    retry      an iteration that failed with an old matrix is repeated from the prediction with a new one, at the same h
+    start over at fixed steps, where h must not be cut: repeated from the positions at t_n, as the prediction may be bad
+    fail       if it failed with a matrix made in this very iteration: TSAdapt cuts h
+  Where old matrices fail again and again (a stiff direction that turns by more than 1/(h omega) in a step) each attempt at reuse costs a
+  failed iteration, and an iteration that is accepted by chance after its first correction may be far off. So the step after a retry gets
+  a new matrix, after the second retry the next two steps, then four, ... until a reused matrix works (MatrixPolicy::learn()).
+  A step size that would grow by less than a factor `hold` is kept, so that the factorization can be used again (adapt.cpp).
 
-  All of it goes through SNESSetLagJacobian(): -2 is "once, now", -1 is "not again". A user's -snes_lag_jacobian, line search
-  or convergence test stands.
+  SNESSetLagJacobian() controls all of this: -2 means "one new matrix, now", -1 "no new matrix". A user's -snes_lag_jacobian, line search
+  or convergence test has precedence.
 */
 #include "corrector.h"
 #include "predictor.h"
@@ -26,10 +26,10 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal proven_fraction        = 0.9; /* of h: so long a step has shown that the solver works at this length */
-constexpr PetscReal fraction_after_failure = 0.7; /* of h at which a correction has failed: what h may grow to, for a while */
+constexpr PetscReal proven_fraction        = 0.9; /* if the last step was at least this part of h, the linear solver works at about this length */
+constexpr PetscReal fraction_after_failure = 0.7; /* h_limit as a part of the h at which the corrector has failed */
 
-/* Once more with a matrix of its own, from the prediction or from where the step begins */
+/* Repeats the iteration with a new Newton matrix, from the prediction or, if from_rest, from the positions at t_n (PredictRest()) */
 PetscErrorCode RunSNESAgain(TS ts, bool from_rest, PetscBool *converged)
 {
   Integrator &I = Get(ts);
@@ -43,7 +43,8 @@ PetscErrorCode RunSNESAgain(TS ts, bool from_rest, PetscBool *converged)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a step that went from where it began and not from its prediction: the smaller residual tells which to take for this one */
+/* After a step that converged only from the positions at its beginning: starts this one from these or from the prediction, whichever
+   has the smaller residual */
 PetscErrorCode ChoosePrediction(TS ts)
 {
   Integrator &I = Get(ts);
@@ -67,7 +68,7 @@ PetscErrorCode ChoosePrediction(TS ts)
 
 } // namespace
 
-/* Solves (9) for X at t1 = t_n + h, from the prediction in X; the ladder above */
+/* Solves (9) for X at t1 = t_n + h, from the prediction in X, by the rules above */
 PetscErrorCode RunCorrector(TS ts, PetscBool *converged)
 {
   Integrator &I = Get(ts);
@@ -75,7 +76,7 @@ PetscErrorCode RunCorrector(TS ts, PetscBool *converged)
   PetscBool   once;
 
   PetscFunctionBegin;
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &once)); /* one solve, which has to be the step's own */
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &once)); /* its only solve needs the matrix of exactly this h */
   c.matrix.want = (PetscBool)(c.matrix.due(EffectiveStep(I), c) || (once && EffectiveStep(I) != c.matrix.h));
   if (c.matrix.have && c.matrix.want) PetscCall(PetscInfo(ts, "corrector: new matrix, h = %g after %g, rate %g\n", (double)EffectiveStep(I), (double)c.matrix.h, (double)c.matrix.rate));
   if (c.from_rest) PetscCall(ChoosePrediction(ts));
@@ -92,8 +93,8 @@ PetscErrorCode RunCorrector(TS ts, PetscBool *converged)
   }
   c.matrix.learn(*converged, retry, c.xi_max, c.of(I.linear.constraint));
   if (!*converged) {
-    /* A matrix that is singular now and then, whatever h, would bring h down to nothing: not below what the last step has shown to work
-       (Failures.SingularMatrixNowAndThen) */
+    /* A matrix that is singular now and then at any h would lower h_limit with each failure, without end. So the limit stays if the
+       last step, of about this length, has succeeded (Failures.SingularMatrixNowAndThen). */
     if (!c.no_solve || I.h_limit <= 0 || I.h_last < proven_fraction * I.h) I.h_limit = fraction_after_failure * I.h;
     I.stat.corrector_fails++;
     PetscCall(PetscInfo(ts, "corrector: %s\n", I.failure));

@@ -1,24 +1,24 @@
 /*
-  When a correction ends: the stopping test, and what follows from it.
+  When the iteration of a step ends: the stopping test, and what follows from it.
 
   Stopping, (40) and (41b): with xi the ratio of two successive corrections, the iteration ends as soon as the error left,
-  xi/(1-xi) times the last correction, changes the error estimate of the step by less than c times the tolerance. The rate
-  of the last corrections with the same matrix answers already after the first iteration.
+  xi/(1-xi) times the last correction, changes the error estimate of the step by less than c times the tolerance. After the first
+  correction, the rate last measured with the same matrix is used.
 
-  Where h is not set by the error test (fixed steps, a largest h) the step's own error is far below the tolerance, and an
-  iteration error of c times the tolerance would be all that is left of its accuracy. Then c refers to the error estimate of
-  the last step instead, down to a hundredth of the tolerance under error control and without limit (and fifty times more
-  strictly) at fixed steps.
+  Where h is not set by the error test (fixed steps, a largest h) the error of the step is far below the tolerance, and an
+  iteration error of c times the tolerance would dominate it. Then c refers to the error estimate of the last step instead: without
+  limit under error control, but not below a hundredth of the tolerance while h_limit holds; without limit, and fifty times more
+  strictly, at fixed steps.
 
-  A correction that no longer falls is accepted where rounding makes one of its size, which is measured then and there (rounding.cpp) and
-  holds for this correction alone: in a position where Phi_q nearly loses rank it is far above that of later steps, whose errors would grow with it.
+  Corrections that no longer decrease are accepted if rounding makes corrections of their size. This is measured at the iterate (rounding.cpp) and
+  holds for this iteration alone: in a position where Phi_q nearly loses rank, rounding is far above that of later steps, whose errors would otherwise grow with it.
 
-  With constraints and little damping c is smaller, ConstrainedTolerance(): what is left of a correction in q excites the
-  multipliers' oscillation, and at alpha = -0.01 c = 1e-3 was enough to fill the error test with it, which no reduction of h mends
-  (h fell to 1e-6). A c that the user has set stands.
+  With constraints and little damping c is smaller, ConstrainedTolerance(): the error left in q excites the
+  multipliers' oscillation. At alpha = -0.01, c = 1e-3 was enough for this oscillation to fail the error test, which no reduction of h cures
+  (h fell to 1e-6). A c that the user has set is used as it is.
 
-  A last correction that proves nothing (verify.cpp), turns back (bisection.cpp), is followed by another one or leaves forces of what is driven
-  (driven.cpp) goes on.
+  The iteration goes on after a small correction if the residual has not followed it (verify.cpp), if the next correction would be too large, or if forces
+  of driven coordinates are not balanced (driven.cpp); and, where it would fail, if corrections alternate in direction (bisection.cpp).
 */
 #include "corrector.h"
 #include "estimate.h"
@@ -32,19 +32,20 @@ namespace hht3
 namespace
 {
 
-/* At fixed steps no error test forgives what the iteration leaves in lambda and q'', of order c/h^2: it gets this much less */
+/* Factor on the iteration's tolerance at fixed steps: the iteration leaves an error of order c/h^2 in lambda and q'', and no error
+   test reduces h to suit it */
 constexpr PetscReal fixed_step_factor = 0.02;
 
-/* A rate below it may be an old matrix' fault, above it the iteration diverges */
+/* Rate above which the iteration counts as diverging; below, an old matrix may be the cause and a new one may help */
 constexpr PetscReal diverging_rate = 0.8;
 
-/* Where the next correction is this part of the last one or more the matrix does not see where the iteration goes */
+/* If the next correction is at least this part of the last one, the matrix is wrong in the direction in which the iteration moves */
 constexpr PetscReal stagnation_ratio = 0.5;
 
-/* New matrices within one correction that is slow: cheaper than a failed one, which cuts h */
+/* Largest number of new matrices within one slow iteration. A failed iteration, which reduces h, costs more. Table in tests/bench/README.md. */
 constexpr PetscInt max_renewals = 3;
 
-/* A correction that no longer falls is as good as it gets where rounding makes one of its size and the matrix is not to blame */
+/* Whether the last correction is not larger than what rounding makes, so that further iterations do not improve it */
 PetscErrorCode IsRounding(TS ts, Vec X, PetscBool *yes)
 {
   Integrator &I = Get(ts);
@@ -53,14 +54,14 @@ PetscErrorCode IsRounding(TS ts, Vec X, PetscBool *yes)
 
   PetscFunctionBegin;
   *yes = PETSC_FALSE;
-  if (!I.fixed_h && c.e > 1) PetscFunctionReturn(PETSC_SUCCESS); /* no step to be accepted by the error test */
+  if (!I.fixed_h && c.e > 1) PetscFunctionReturn(PETSC_SUCCESS); /* above the tolerance nothing is accepted as rounding: the error test would not accept the step */
   PetscCall(RoundingOfCorrection(ts, X, &noise));
   *yes = (PetscBool)(c.e <= rounding_factor * noise);
   if (*yes) PetscCall(PetscInfo(ts, "corrector: corrections of %g of the tolerance are rounding at t = %g, h = %g\n", (double)c.e, (double)I.t1, (double)I.h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A slow correction goes on with a matrix made at its present iterate */
+/* A slow iteration goes on with a new matrix, made at the present iterate */
 PetscErrorCode FreshMatrixNextIteration(TS ts)
 {
   Integrator &I = Get(ts);
@@ -75,7 +76,7 @@ PetscErrorCode FreshMatrixNextIteration(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the last correction is largest in units of the tolerance, which tells where a mechanism is stuck: JointRuns.AMotionBeyondReach */
+/* The unknown whose last correction is largest in units of the tolerance: it shows where a mechanism is stuck (JointRuns.AMotionBeyondReach) */
 PetscErrorCode LabelLargestCorrection(TS ts, RowLabel *label)
 {
   Integrator &I = Get(ts);
@@ -109,16 +110,16 @@ PetscErrorCode EndDiverged(TS ts, const char *why)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What may be left of a correction, in units of the tolerance */
+/* Largest error that the iteration may leave, in units of the tolerance */
 PetscReal IterationTolerance(const Integrator &I)
 {
   const Corrector &c = I.corrector;
   const PetscReal tol = CorrectorTolerance(I);
-  const PetscReal least = I.h_limit > 0 ? 0.01 : 0; /* h is short for the corrector's sake */
+  const PetscReal least = I.h_limit > 0 ? 0.01 : 0; /* failures have made h small, and a tolerance that falls with the error would cause more of them */
   return I.fixed_h ? fixed_step_factor * tol * PetscMin(c.wlte, 1) : tol * PetscClipInterval(c.wlte, least, 1);
 }
 
-/* The iteration does not converge as it is: is that rounding, may a new matrix help, or has it failed? */
+/* The iteration does not converge with the present matrix: accepts it if that is rounding, tries a new matrix, or ends it as failed */
 PetscErrorCode TryNewMatrix(TS ts, const Corrections &so_far, Vec X)
 {
   Corrector      &c        = Get(ts).corrector;
@@ -126,19 +127,19 @@ PetscErrorCode TryNewMatrix(TS ts, const Corrections &so_far, Vec X)
   PetscBool       rounding = PETSC_FALSE;
 
   PetscFunctionBegin;
-  if (c.base || xi >= diverging_rate) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is due whatever it says */
+  if (c.base || xi >= diverging_rate) PetscCall(IsRounding(ts, X, &rounding)); /* otherwise a new matrix is tried in any case */
   if (rounding && c.base) c.reason = SNES_CONVERGED_SNORM_RELATIVE;
   else if (c.renewals < max_renewals && so_far.left > 2 && (xi < diverging_rate || rounding)) PetscCall(FreshMatrixNextIteration(ts));
   else PetscCall(EndDiverged(ts, xi >= 1 ? "diverges" : "converges too slowly"));
   c.rounding = (PetscBool)(c.reason > 0);
   if (c.rounding) {
-    c.matrix.rate = -1; /* that of noise says nothing of the matrix */
+    c.matrix.rate = -1; /* a rate of rounding says nothing about the matrix */
     c.xi_max      = 0;  /* a new matrix would not help */
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One more correction of size e has been made: converged, going on, renew the matrix, or give up */
+/* Judges the iteration after a correction of size e: converged, to be continued, to be continued with a new matrix, or failed */
 PetscErrorCode JudgeIteration(TS ts, PetscReal e, Vec X)
 {
   Integrator       &I      = Get(ts);
@@ -164,7 +165,7 @@ PetscErrorCode JudgeIteration(TS ts, PetscReal e, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the user's test decides, the rate is only measured, for the reuse of the matrix */
+/* If the user's convergence test decides, the rate is only measured, for the reuse of the matrix */
 PetscErrorCode MeasureRate(TS ts, PetscReal e)
 {
   Corrector      &c  = Get(ts).corrector;
@@ -193,8 +194,8 @@ PetscErrorCode FailUnproved(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On with the iteration, whose matrices are of every iterate from now on: on the way through a stiff direction that turns, spurious forces
-   make one that is as wrong an iteration later */
+/* The iteration goes on with a new matrix at every iterate: while a stiff direction turns, spurious forces at an iterate give a matrix that is
+   wrong again at the next one */
 PetscErrorCode FreshMatrices(TS ts)
 {
   PetscFunctionBegin;
@@ -204,8 +205,9 @@ PetscErrorCode FreshMatrices(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual has not followed the correction: on with the iteration, whose rate will tell; then with new matrices, since stiffness may
-   end on the way of a correction; and where none is better, with a smaller h, at which less is left of it */
+/* The residual has not followed the correction. The iteration goes on, so that its rate can be measured; then with new matrices, as
+   stiffness may end on the way of a correction. If these do not help either, the step fails and is repeated with a smaller h, at
+   which the stiffness matters less. */
 PetscErrorCode GoOnUnproved(TS ts)
 {
   Corrector &c = Get(ts).corrector;
@@ -220,8 +222,9 @@ PetscErrorCode GoOnUnproved(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A correction that has failed with a matrix of its own may have turned back and forth; one that follows a meeting point may do so at once. In a system
-   of several steep forces the next meeting point is in another one, and each earns two more iterations. */
+/* An iteration that has failed with a matrix of its own may alternate between two sides of a steep force; after a bisection it may do
+   so at once. Then bisection finds the point between them. In a system with several steep forces the next bisection is at another
+   one, and each adds two iterations to the limit. */
 PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 {
   Corrector &c = Get(ts).corrector;
@@ -238,7 +241,7 @@ PetscErrorCode GoOnBetween(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the correction `next` goes on in the direction of dX */
+/* Whether the correction `next` goes on in the direction of dX: its component along dX is at least stagnation_ratio |dX| */
 PetscErrorCode ContinuesCorrection(const Integrator &I, Vec dX, Vec next, Vec work, PetscBool *yes)
 {
   PetscScalar dot, square;
@@ -251,14 +254,15 @@ PetscErrorCode ContinuesCorrection(const Integrator &I, Vec dX, Vec next, Vec wo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual F has followed the last correction, but may stand in other directions than those in which the matrix has answered it: turned
-   about the direction of a stiff spring it is a soft force, which a matrix that is a little off takes for a stiff one, correction after
-   correction. So the next correction is asked for: that it is small is no proof if it goes on in the direction of the last one. */
+/* The residual F has become small along with the last correction, but what is left of it may have another direction: at a right angle
+   to a stiff spring it is a force on a soft direction, which a matrix that is slightly off takes for a stiff one, correction after
+   correction. So the next correction is computed. If it is small, this proves nothing as long as it goes on in the direction of the
+   last one. */
 PetscErrorCode AskNextCorrection(TS ts, Vec X, Vec dX, Vec F)
 {
   Integrator     &I    = Get(ts);
   Corrector      &c    = I.corrector;
-  const Vec       next = I.verify.work, work = I.verify.model; /* the proof has done with them */
+  const Vec       next = I.verify.work, work = I.verify.model; /* free again: the proof is over */
   const PetscReal tol  = IterationTolerance(I);
   PetscReal       e;
   PetscBool       goes_on = PETSC_TRUE, rounding = PETSC_FALSE;
@@ -277,7 +281,8 @@ PetscErrorCode AskNextCorrection(TS ts, Vec X, Vec dX, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces of driven coordinates are not among what has been judged so far; with an old matrix they may not converge */
+/* Forces of driven coordinates, which corrections do not show, have to be balanced, too. With an old matrix they may not converge:
+   then a new one is made. */
 PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
 {
   Integrator     &I      = Get(ts);
@@ -297,10 +302,13 @@ PetscErrorCode AskForces(TS ts, Vec X, Vec F, PetscBool *evaluated)
 
 } // namespace
 
-/* Norms whose squares underflow are none: answers to numbers that small may be zero, and a motion that dies away gets there (LinearSolves.AMotionThatDiesAway) */
+/* Norms below this count as zero: their squares underflow, so that a solution of zero is right. A motion that dies away gets there
+   (LinearSolves.AMotionThatDiesAway). */
 constexpr PetscReal least_norm = 1e-150;
 
-/* A preconditioner may be singular, and a Krylov method converge in its norm (LinearSolves.PreconditionersOfOtherProblems): the solution of J dX = F is no shorter than |F|/|J|. */
+/* A Krylov method with a singular preconditioner can report convergence although it has solved nothing
+   (LinearSolves.PreconditionersOfOtherProblems). Any solution of J dX = F satisfies |dX| >= |F|/|J|; a dX of less than half of that
+   is recognized here. */
 PetscErrorCode SolveFoundNothing(TS ts, Vec dX, Vec F, bool after, PetscBool *yes)
 {
   KSP       ksp;
@@ -316,7 +324,7 @@ PetscErrorCode SolveFoundNothing(TS ts, Vec dX, Vec F, bool after, PetscBool *ye
   PetscCall(SNESGetKSP(ts->snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &direct, PCLU, PCCHOLESKY, ""));
-  if (d == 0 || after || direct || Get(ts).linear.constraint) PetscFunctionReturn(PETSC_SUCCESS); /* PCHHTCONSTRAINT is not singular where its matrix is not */
+  if (d == 0 || after || direct || Get(ts).linear.constraint) PetscFunctionReturn(PETSC_SUCCESS); /* PCHHTCONSTRAINT is singular only if the matrix is */
   PetscCall(KSPGetOperators(ksp, &J, NULL));
   PetscCall(MatHasOperation(J, MATOP_NORM, &has_norm));
   if (!has_norm) PetscFunctionReturn(PETSC_SUCCESS);
@@ -326,7 +334,8 @@ PetscErrorCode SolveFoundNothing(TS ts, Vec dX, Vec F, bool after, PetscBool *ye
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The correction dX has led to X: judged, and proved if it is to be the last one. F holds the residual at X on return if `evaluated`. */
+/* Counts and judges the correction dX, which has led to X, and proves it if it is to be the last one. On return F holds the residual
+   at X if `evaluated`. */
 PetscErrorCode CountCorrection(TS ts, PetscReal e, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 {
   Integrator &I = Get(ts);

@@ -1,5 +1,5 @@
-/* Decisions of the corrector on numbers alone: when a matrix is due, and when an iteration has converged. "(n)" is the number of an
-   equation in Negrut et al. (2005). */
+/* The decisions of the corrector as pure functions of numbers: when a matrix is due, and when an iteration has converged. "(n)" is the number of
+   an equation in Negrut et al. (2005). */
 #ifndef HHTDAE_POLICY_H
 #define HHTDAE_POLICY_H
 
@@ -10,11 +10,12 @@ namespace hht3
 
 struct ReuseOptions {
   PetscReal ratio     = 1.4;  /* h over the h of the matrix, or its inverse, beyond which the matrix is renewed */
-  PetscReal slow_rate = 0.25; /* measured rate beyond which the next step gets a new matrix */
-  PetscReal hold      = 1.2;  /* growth of h that is not worth a new matrix */
-  PetscBool given     = PETSC_FALSE; /* by the user */
+  PetscReal slow_rate = 0.25; /* measured rate of convergence beyond which the next step gets a new matrix */
+  PetscReal hold      = 1.2;  /* h does not grow by less than this factor, since that is not worth a new matrix */
+  PetscBool given     = PETSC_FALSE; /* the user has set the three numbers */
 
-  /* The same where a matrix costs no factorization, but as much as a few solves: with 0.25 a step of fullbody of tests/bench takes 9 corrections in place of 5 */
+  /* slow_rate if a matrix costs no factorization but only as much as a few solves: with 0.25 a step of fullbody of tests/bench takes
+     9 corrections in place of 5 */
   static constexpr PetscReal slow_rate_without_factor = 0.1;
   ReuseOptions of(bool without_factor) const
   {
@@ -24,15 +25,15 @@ struct ReuseOptions {
   }
 };
 
-/* The Newton matrix, what its use has shown, and whether the next correction gets another one */
+/* What is known of the Newton matrix, and whether the next step gets another one */
 struct MatrixPolicy {
-  PetscBool have  = PETSC_FALSE; /* it is (10) of some earlier step */
-  PetscBool want  = PETSC_TRUE;  /* renew it before the next correction */
-  PetscBool fresh = PETSC_FALSE; /* it was made in the present correction */
-  PetscReal h     = 0;           /* it was made with */
-  PetscReal rate  = -1;          /* last measured rate with it, -1 before the first measurement */
-  PetscInt  renew_steps = 0;     /* steps that get a new matrix after an old one has failed; doubled while old ones go on failing */
-  PetscInt  renew_left  = 0;     /* of these, still to come */
+  PetscBool have  = PETSC_FALSE; /* there is a matrix (10), perhaps of an earlier step */
+  PetscBool want  = PETSC_TRUE;  /* a new matrix is to be made at the beginning of the next iteration */
+  PetscBool fresh = PETSC_FALSE; /* the matrix was made in the present run of the iteration */
+  PetscReal h     = 0;           /* EffectiveStep() of the matrix */
+  PetscReal rate  = -1;          /* last measured rate of convergence with the matrix, -1 before the first measurement */
+  PetscInt  renew_steps = 0;     /* number of steps that get a new matrix after an old one has failed; doubled while old ones go on failing */
+  PetscInt  renew_left  = 0;     /* how many of these are still to come */
 
   static constexpr PetscInt max_renew_steps = 32;
 
@@ -44,7 +45,7 @@ struct MatrixPolicy {
     rate  = -1;
   }
 
-  /* The matrix of the run is another one than that of the last steps: the next correction makes its own */
+  /* The matrix can no longer be used, for instance after a change of coordinates or of the solver */
   void forget()
   {
     have = PETSC_FALSE;
@@ -53,10 +54,10 @@ struct MatrixPolicy {
     rate = -1;
   }
 
-  /* Before a correction with the step `now` */
+  /* Whether a step of size `now` needs a new matrix */
   bool due(PetscReal now, const ReuseOptions &o) const { return want || !have || !(h > 0) || now > o.ratio * h || now * o.ratio < h; }
 
-  /* From the end of a correction, whose worst rate was `worst`; retried: with a new matrix after an old one had failed */
+  /* After the iteration of a step: `worst` is its largest rate, `retried` that it was repeated with a new matrix because an old one had failed */
   void learn(bool converged, bool retried, PetscReal worst, const ReuseOptions &o)
   {
     if (retried) renew_steps = renew_left = PetscClipInterval(2 * renew_steps, 1, max_renew_steps);
@@ -66,29 +67,30 @@ struct MatrixPolicy {
   }
 };
 
-/* A remembered rate is believed down to here: it was measured steps ago on smaller corrections, and the matrix has aged since.
-   With 0.02 the error that first iterations left behind was up to ten times that of the step (heavy top, 1e-7); 0.3 costs
+/* Smallest rate that is assumed on the word of earlier steps: it was measured on smaller corrections, when the matrix was newer.
+   With 0.02 the error that the first iterations left behind was up to ten times that of the step (heavy top, 1e-7); 0.3 costs
    5 to 20 % more iterations. */
 constexpr PetscReal least_remembered_rate = 0.3;
 
-/* Of the tolerance: a correction so small needs no rate */
+/* A first correction below this part of the iteration's tolerance is accepted without a rate */
 constexpr PetscReal immediate_tolerance = 0.1;
 
-enum class Verdict { Converged, GoOn, Stalled, TooMany }; /* stalled: it does not converge in the iterations that are left */
+enum class Verdict { Converged, GoOn, Stalled, TooMany }; /* Stalled: at the measured rate the remaining iterations do not suffice */
 
-/* Corrections with one matrix, in units of the tolerance */
+/* The last two corrections, in units of the tolerance */
 struct Corrections {
   PetscReal last = 0, before = 0;
-  PetscInt  with_matrix = 0; /* that were made with the present matrix in this iteration */
-  PetscInt  left        = 0; /* that may follow */
-  bool      rough       = false; /* each solve leaves a part, as Krylov methods do */
+  PetscInt  with_matrix = 0; /* number of corrections made with the present matrix in this iteration */
+  PetscInt  left        = 0; /* number of corrections that may follow */
+  bool      rough       = false; /* linear solves are inexact, as those of Krylov methods are */
   PetscReal rate() const { return last / before; }
-  /* What the first solve has left in other directions may be more than the first correction: a second one that is slow says nothing, the third tells the rate */
+  /* The error of a rough first solve may exceed the first correction in other directions. So a slow second correction says nothing;
+     only the third one shows the rate. */
   bool tooEarly() const { return rough && with_matrix == 2; }
 };
 
-/* (40), (41b): converged as soon as the error left, rate/(1-rate) times the last correction, is below tol. A rate of earlier steps (-1: none)
-   answers after the first correction; below `floor` corrections are rounding. */
+/* (40), (41b): converged as soon as the error left, rate/(1-rate) times the last correction, is below tol. After the first correction the rate of
+   earlier steps is used (-1: there is none). Corrections below `floor` are rounding. */
 inline Verdict JudgeCorrections(const Corrections &c, PetscReal known_rate, PetscReal tol, PetscReal floor)
 {
   if (c.last <= floor) return Verdict::Converged;

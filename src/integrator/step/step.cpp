@@ -1,9 +1,9 @@
 /*
   One step: begin, predict, correct, estimate, accept or reject.
 
-  The state at t_n is U0, V0, A0 and the unknowns X0; an accepted step stays in U1, V1, A1, X until the next
-  one begins, so that TSInterpolate() and TSRollBack() find both ends. vec_sol and vec_dot hold the last accepted state
-  whatever happens in between.
+  The state at t_n is U0, V0, A0 with the unknowns X0. An accepted step stays in U1, V1, A1, X until the next one begins, so
+  that TSInterpolate() and TSRollBack() find both ends. vec_sol and vec_dot hold the last accepted state, except while TSAdapt
+  decides on a new one.
 */
 #include "integrator/coordinates/change.h"
 #include "integrator/checkpoint/checkpoint.h"
@@ -29,19 +29,22 @@ namespace hht3
 namespace
 {
 
-/* Of the running maximum of h, from step to step; of the limit of h after a failed correction; and of h, from where on that limit is far away and forgotten (without, creep at
-   v_s = 1e-6 and a release of friction at 1e10 in the table of stability miss) */
+/* With each accepted step h_regular is multiplied by the first and h_limit, which a failed correction has set, by the second. h_limit
+   is dropped when it exceeds the third times h: otherwise creep at v_s = 1e-6 and a release of friction at 1e10 in the table of
+   stability fail. */
 constexpr PetscReal regular_decay = 0.9, limit_growth = 1.02, limit_forgotten = 4;
 
-/* (1e-28 times as much)^2 is a number, too, see vanishing_step (FrontDoor.RunsOfNoLength) */
+/* Shortest h for which (vanishing_step h)^2 = (1e-28 h)^2 does not underflow (FrontDoor.RunsOfNoLength) */
 constexpr PetscReal shortest_step = 1e-120;
 
-/* Corrections that the residual has not answered where the Jacobian was evaluated: a model may have such places, a wrong Jacobian
-   has them again and again */
-constexpr PetscReal max_jacobian_faults = 3, fault_decay = 0.01; /* forgiven: with every accepted step */
+/* The run ends after so many failures for which wrong_jacobian.cpp blames the application's Jacobian; each accepted step takes
+   fault_decay off their number. A single one proves nothing, as a correct model may have places where it happens; with a wrong
+   Jacobian it happens again and again. */
+constexpr PetscReal max_jacobian_faults = 3, fault_decay = 0.01;
 
-/* -ts_exact_final_time interpolate leaves the solution at the end of a run in the vector that TSSolve() was given, and takes it for that at the end of the last step
-   when it is called again with it (BetweenRuns.GoOnFromInterpolatedEnds) */
+/* With -ts_exact_final_time interpolate, TSSolve() leaves the solution at the final time in the user's vector, although the last step
+   ends later. When it is called again with this vector, it takes the vector for the solution at the end of that step. *yes: vec_sol
+   is such a vector (BetweenRuns.GoOnFromInterpolatedEnds). */
 PetscErrorCode IsInterpolatedEnd(TS ts, PetscBool *yes)
 {
   WorkVec x;
@@ -82,7 +85,7 @@ PetscErrorCode StateWasChanged(TS ts, PetscReal t, Vec U, Vec V, PetscBool *chan
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The accepted step becomes the history */
+/* The accepted step becomes history: its end is the new t_n */
 PetscErrorCode CommitStep(TS ts)
 {
   Integrator &I = Get(ts);
@@ -103,7 +106,7 @@ PetscErrorCode CommitStep(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the step starts from: the last one, the one before a roll-back, or a consistent start */
+/* Prepares the state at t_n: the end of the last step, its beginning after a roll-back, or a consistent start from vec_sol and vec_dot */
 PetscErrorCode BeginStep(TS ts)
 {
   Integrator &I       = Get(ts);
@@ -137,7 +140,8 @@ PetscErrorCode BeginStep(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* t_n + (t_end - t_n) may miss t_end by a rounding error, and the step over the rest would be one too */
+/* Whether t is the time `stop` but for rounding: t_n + (stop - t_n) may miss it by a rounding error, and another step over this
+   remainder makes no sense */
 bool EndsAt(const Integrator &I, PetscReal t, PetscReal stop) { return PetscAbsReal(t - stop) < PetscMax(1e-10 * I.h, 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(stop)); }
 
 PetscErrorCode AcceptStep(TS ts, PetscBool tiny, PetscReal next)
@@ -147,7 +151,7 @@ PetscErrorCode AcceptStep(TS ts, PetscBool tiny, PetscReal next)
   const PetscReal stop = HHT3StopAfter(ts, ts->ptime);
 
   PetscFunctionBegin;
-  /* the acceleration that counts as true at the end of the step: in the paper's form the unknown itself */
+  /* In the paper's form q'' at t_{n+1} is the unknown itself; until here A1 was X/(1 + alpha), as (9a) needs it */
   if (I.form == TSHHT3_FORM_PAPER) PetscCall(ForEntries([&](PetscInt i, PetscScalar x, PetscScalar &a) { if (IsCoordinate(I, i)) a = x; }, Read(I.X), Write(I.A1)));
   PetscCall(UpdateWeights(ts, I.U1));
   ts->ptime = I.t1;
@@ -155,7 +159,7 @@ PetscErrorCode AcceptStep(TS ts, PetscBool tiny, PetscReal next)
   ts->time_step = I.h_next = next;
   if (I.h_chosen && !HHT3EventActive(ts)) HHT3StepAfterEvent(ts, {unset_step, petsc_default_step, I.h_after_event}, next);
   if (I.h_chosen && !HHT3EventActive(ts)) I.h_after_event = next;
-  /* the step to the stop was what was left, and would be taken for what the user wants */
+  /* time_step was cut to reach `stop`; the user's step size holds again after it */
   if (I.fixed_h && ts->ptime == stop && I.h_given > 0) {
     const PetscReal rest = HHT3StopAfter(ts, stop) - stop;
     I.h_next = ts->time_step = I.h_given;
@@ -173,7 +177,8 @@ PetscErrorCode AcceptStep(TS ts, PetscBool tiny, PetscReal next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TSSolve() cuts a step that is longer than the run; TSEvent makes its own steps on the way to a zero */
+/* With fixed steps, notes a step size that the user has set since the last step. The size is not the user's where TSSolve() has cut
+   it to the rest of the run, and while TSEvent makes the steps on the way to a zero. */
 void NoteGivenStep(TS ts)
 {
   Integrator     &I    = Get(ts);
@@ -183,7 +188,7 @@ void NoteGivenStep(TS ts)
   if (ts->time_step != I.h_next && PetscAbsReal(ts->time_step - rest) > 1e-10 * rest) I.h_given = ts->time_step;
 }
 
-/* From t_n over the step size of the TS */
+/* Sets t0, t1 and h for an attempt from t_n with the step size of the TS */
 PetscErrorCode BeginStage(TS ts)
 {
   Integrator &I = Get(ts);
@@ -224,7 +229,7 @@ PetscErrorCode AttemptStep(TS ts, PetscBool *tiny, PetscBool *ok)
     PetscCall(NoteMatrices(ts));
   }
   PetscCall(TSPostStage(ts, I.t1, 0, &I.U1));
-  /* it judges by what SNES said last, and so knows nothing of a failure before SNES was asked */
+  /* TSAdaptCheckStage() judges by the last SNESConvergedReason, and so misses a failure before SNESSolve(): then time_step is cut here */
   PetscCall(TSAdaptCheckStage(ts->adapt, ts, I.t1, I.U1, &stage));
   if (!*ok && stage) ts->time_step *= ts->adapt->scale_solve_failed;
   if (*ok && !stage) PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "TSAdapt, or the function of TSSetFunctionDomainError(), does not take the state at t = %g", (double)I.t1));
@@ -232,15 +237,17 @@ PetscErrorCode AttemptStep(TS ts, PetscBool *tiny, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TSAdaptChoose() accepts whatever step there is while an event is looked for, and the one from there to the end of the step that had it. The event
-   may have switched on what such a step cannot follow. */
+/* While TSEvent looks for a zero, and for the step from the event to the end of the step that contained it, TSAdaptChoose() accepts
+   every step. As the event may have switched on forces that such a step does not follow, the choose() of the TSAdapt is called, which
+   applies the error test. */
 PetscErrorCode AskAdapt(TS ts, PetscReal *next, PetscBool *accept)
 {
   Integrator &I = Get(ts);
   PetscInt    scheme = 0;
   PetscReal   wlte[3];
 
-  /* what TSAdaptChoose() cuts for the end of the run would be what rounding has left until there, where the step ends there (BetweenRuns.SolvedInParts) */
+  /* Where the attempt ends the run but for rounding, TSAdaptChoose() would cut the next step to this rounding; so it is called as if
+     the run went on (BetweenRuns.SolvedInParts) */
   const TSExactFinalTimeOption exact = ts->exact_final_time;
   const bool                   last  = exact == TS_EXACTFINALTIME_MATCHSTEP && EndsAt(I, I.t1, ts->max_time);
 
@@ -259,13 +266,13 @@ PetscErrorCode AskAdapt(TS ts, PetscReal *next, PetscBool *accept)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* vec_sol and vec_dot take the new state while TSAdapt looks at it, and the old one back if it is rejected */
+/* vec_sol and vec_dot hold the new state while TSAdapt decides on it, and the old one again if it is rejected */
 PetscErrorCode AcceptOrReject(TS ts, PetscBool tiny, PetscReal *next, PetscBool *accept)
 {
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  I.status       = tiny ? TS_STEP_INCOMPLETE : TS_STEP_PENDING; /* of a tiny step there is no estimate */
+  I.status       = tiny ? TS_STEP_INCOMPLETE : TS_STEP_PENDING; /* a tiny step has no error estimate */
   I.wlte_pending = -1;
   I.order.chosen = PETSC_FALSE;
   PetscCall(VecCopy(I.U1, ts->vec_sol));
@@ -280,14 +287,14 @@ PetscErrorCode AcceptOrReject(TS ts, PetscBool tiny, PetscReal *next, PetscBool 
     PetscCall(PetscInfo(ts, "step of %g from t = %g rejected by the error test, next %g\n", (double)I.h, (double)I.t0, (double)*next));
   } else if (!tiny) {
     PetscCall(NoteError(ts));
-    PetscCall(ChooseOrder(ts, NULL)); /* unless our TSAdapt has done it, with its step */
+    PetscCall(ChooseOrder(ts, NULL)); /* does nothing if TSAdaptChoose_HHT() has chosen the order together with h */
   }
   I.order.accepted = tiny ? 0 : I.order.now;
   I.status = *accept ? TS_STEP_COMPLETE : TS_STEP_INCOMPLETE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ends the run with the last accepted state in place: by an error, or, if the user asked not to have one, by the reason */
+/* Ends the run with the last accepted state in vec_sol and vec_dot: by an error or, with -ts_error_if_step_fails 0, by a TSConvergedReason */
 PetscErrorCode FailStep(TS ts, const char *what)
 {
   Integrator &I = Get(ts);
@@ -295,7 +302,7 @@ PetscErrorCode FailStep(TS ts, const char *what)
   PetscFunctionBegin;
   const char *hint = I.constraints() && RelativeDamping(I.p.rho) < 0.1 ? " At this alpha or spectral radius hardly anything damps the multipliers' oscillation, which may be the cause: -ts_hhtdae_alpha -0.05." : "";
   if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
-  ts->steprestart = PETSC_TRUE; /* whoever goes on from here starts afresh */
+  ts->steprestart = PETSC_TRUE; /* if the run goes on from here, it does so with a consistent start */
   PetscCall(VecCopy(I.U0, ts->vec_sol));
   PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
@@ -306,7 +313,7 @@ PetscErrorCode FailStep(TS ts, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a rejection: is there a point in another attempt? */
+/* After a rejected or failed attempt: ends the run if there is no point in another one */
 PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
 {
   const Integrator &I = Get(ts);
@@ -321,8 +328,9 @@ PetscErrorCode CheckRejections(TS ts, PetscInt rejections)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TSSolve() cuts the step to what is left until the next stop. Nothing is left where it is called at the end of a run, less than nothing where points of a time span, or ends of earlier runs,
-   are behind the time at which a run begins, goes on or is resumed: then the step is the one before. */
+/* TSSolve() cuts the step to the time left until the next stop. This is zero if TSSolve() is called at the end of a run, and negative
+   if points of a time span, or the end of an earlier run, lie before the time at which a run begins, goes on or is resumed. Then the
+   step size from before the cut is restored. */
 PetscErrorCode PassStops(TS ts)
 {
   const Integrator &I       = Get(ts);
@@ -331,11 +339,11 @@ PetscErrorCode PassStops(TS ts)
 
   PetscFunctionBegin;
   PetscCall(HHT3PassStops(ts, &passed));
-  /* of PETSc 3.18, whatever the integrator (Events.ThatGoBackAreRefused) */
+  /* PETSc 3.18 does this with any integrator (Events.ThatGoBackAreRefused) */
   PetscCheck(ts->time_step > 0 || !HHT3EventActive(ts), PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
              "TSEvent asks for a step of %g at t = %g, as it does in some versions of PETSc where a function with a direction crosses zero the other way: set direction 0, and let the handler see which way it goes",
              (double)ts->time_step, (double)ts->ptime);
-  const bool cut = ts->time_step < 0 && I.stat.steps > 0 && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP; /* by a TSSolve() to a time that was past */
+  const bool cut = ts->time_step < 0 && I.stat.steps > 0 && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP; /* by a TSSolve() to a time in the past */
   if (ts->time_step != 0 && !cut && !(ts->time_step < 0 && (passed || resumed))) PetscFunctionReturn(PETSC_SUCCESS);
   if (I.h_next > 0) ts->time_step = I.h_next;
   else ts->time_step = I.auto_h ? unset_step : I.h_given;
@@ -381,7 +389,7 @@ PetscErrorCode TSStep_HHT(TS ts)
     }
     if (!ok || !accept) {
       accept = PETSC_FALSE;
-      PetscCall(HistoryForces(ts, ts->ptime)); /* an application that failed when f_n was evaluated would spoil every attempt from t_n */
+      PetscCall(HistoryForces(ts, ts->ptime)); /* f_n again: if the application has failed to evaluate it, every attempt from t_n fails */
       PetscCall(CheckRejections(ts, ++rejections));
       if (!ok) PetscCall(LowerAfterFailure(ts));
     }
@@ -391,7 +399,7 @@ PetscErrorCode TSStep_HHT(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Back to t_n: U0, V0 and the history have not been touched since */
+/* Returns to t_n: the accepted step has not been committed, so that U0, V0 and the history still belong to t_n */
 PetscErrorCode TSRollBack_HHT(TS ts)
 {
   Integrator &I = Get(ts);
