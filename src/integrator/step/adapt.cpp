@@ -1,6 +1,6 @@
 /*
-  The default type of TSAdapt, "hhtdae": PETSc's basic controller, which with the order of the estimate is (41), and reasons to take another h
-  than it says. It is replaced by any other type, as by -ts_adapt_type basic.
+  The default type of TSAdapt, "hhtdae": PETSc's basic controller, which with the order of the estimate is (41), and rules that change the h
+  it chooses. Any other type replaces it, as by -ts_adapt_type basic.
 */
 #include "estimate.h"
 #include "order.h"
@@ -18,8 +18,8 @@ struct Basic {
   ChooseFunction choose = nullptr;
 };
 
-/* After a failed correction the error test would lead h straight back to where it failed: it may do so by and by. And a gain
-   in h below the threshold costs more in matrices than it saves in steps. */
+/* After a failed correction the controller would raise h at once to the value at which it failed: h_limit makes it do so slowly. And
+   growth of h by less than a factor `hold` costs more in matrices than it saves in steps. */
 PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
 {
   const Integrator &I = Get(ts);
@@ -32,12 +32,15 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of the tolerance: nothing moves, or evenly */
+/* An error estimate below this part of the tolerance: nothing moves, or everything moves evenly */
 constexpr PetscReal negligible_error = 1e-3;
-constexpr PetscReal waiting_growth   = 2;   /* times the last step: what lasts as long as it has been waited for is not stepped over (Excitation.WhatSetsInLater) */
-constexpr PetscReal regular_fraction = 0.1; /* of the steps before a failure: so far the way back is free (the table's jumps of velocities) */
+/* Then h grows by no more than this factor: a load that lasts as long as the time before it is not stepped over
+   (Excitation.WhatSetsInLater) ... */
+constexpr PetscReal waiting_growth   = 2;
+/* ... but freely up to this part of h_regular, so that steps recover from a failure (jumps of velocities in the table of stability) */
+constexpr PetscReal regular_fraction = 0.1;
 
-/* Where nothing moves the error says nothing of loads and motions that are to come */
+/* Where nothing moves, the error estimate says nothing about loads and motions that set in later: limits the growth of h if there are any */
 PetscErrorCode WaitForLoads(TS ts, PetscReal h, PetscReal *next)
 {
   Integrator     &I        = Get(ts);
@@ -50,8 +53,8 @@ PetscErrorCode WaitForLoads(TS ts, PetscReal h, PetscReal *next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step that is cut short where one has to end changes h at once, which leaves an error in the multipliers for as many steps as the history has: the last
-   steps before are of one length (LastSteps.AreOfOneLength) */
+/* If only the last step before a given time were shortened, this change of h would leave an error in the multipliers for as many
+   steps as the history has. So the last steps before such a time share the remainder in equal parts (LastSteps.AreOfOneLength). */
 PetscErrorCode ShareTheRest(TS ts, PetscReal h, PetscReal *next)
 {
   const PetscReal rest = HHT3StopAfter(ts, ts->ptime + h) - (ts->ptime + h), equal = 1e-6; /* but for rounding */
@@ -64,14 +67,14 @@ PetscErrorCode ShareTheRest(TS ts, PetscReal h, PetscReal *next)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* wlte < 0: of a step too short for the corrector there is no estimate, and so no growth by the controller */
+/* wlte < 0: a step too short for the corrector has no error estimate, so that the controller does not let h grow */
 PetscErrorCode TSAdaptChoose_HHT(TSAdapt adapt, TS ts, PetscReal h, PetscInt *scheme, PetscReal *next, PetscBool *accept, PetscReal *wlte, PetscReal *wltea, PetscReal *wlter)
 {
   PetscBool ours;
 
   PetscFunctionBegin;
   PetscCall((*static_cast<Basic *>(adapt->data)->choose)(adapt, ts, h, scheme, next, accept, wlte, wltea, wlter));
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours)); /* the adaptor of a TS outlives a change of the TS' type */
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts, TSHHT3, &ours)); /* the TSAdapt stays when the type of the TS is changed */
   if (!ours || !*accept) PetscFunctionReturn(PETSC_SUCCESS);
   if (*wlte >= 0) PetscCall(ChooseOrder(ts, next));
   if (*wlte >= 0 && *wlte < negligible_error) PetscCall(WaitForLoads(ts, h, next));
@@ -91,7 +94,9 @@ PetscErrorCode TSAdaptDestroy_HHT(TSAdapt adapt)
 
 } // namespace
 
-/* The run goes on beyond the end up to which nothing was to be seen, Excitation.InARunThatGoesOn. Where the step does not coast that is soon enough when one is to grow. */
+/* The last search for loads and motions has found none up to the end of the run at that time, and now the run goes on beyond it
+   (Excitation.InARunThatGoesOn). They are looked for at once only if the step is long and nothing moves; otherwise WaitForLoads()
+   does it before h grows. */
 PetscErrorCode LookAheadAgain(TS ts)
 {
   Integrator &I = Get(ts);
@@ -107,7 +112,7 @@ PetscErrorCode LookAheadAgain(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The basic type, whose choice is looked at */
+/* TSADAPTBASIC with its choose() wrapped by TSAdaptChoose_HHT() */
 PetscErrorCode TSAdaptCreate_HHT(TSAdapt adapt)
 {
   PetscFunctionBegin;

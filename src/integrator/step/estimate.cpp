@@ -1,9 +1,9 @@
 /*
   The error test: (26), (27) with the weights Y_i.
 
-  Positions are judged by delta = k h^2 (a_{n+1} - a_n); first-order states by k_s h^3 s''' with s''' from the last three
-  derivatives s'; lambda, V and F never. In PETSc's terms weight_i = 1/max(atol_i, rtol_i Y_i) with Y_i the running maximum
-  of |q_i| over accepted steps. The local error is of third order, which makes TSADAPTBASIC with its safety factor 0.9 the
+  The local error is delta = k h^2 (a_{n+1} - a_n) for positions, and k_s h^3 s''' for first-order states, with s''' from the last three
+  derivatives s'; lambda, V and F are not tested. In PETSc's terms weight_i = 1/max(atol_i, rtol_i Y_i) with Y_i the running maximum
+  of |q_i| over accepted steps. As the local error is of third order, TSADAPTBASIC with its safety factor 0.9 is the
   controller (41), h_new = 0.9 h / Theta^(1/6).
 */
 #include "corrector.h"
@@ -18,7 +18,7 @@ namespace hht3
 namespace
 {
 
-/* 1/max(atol, rtol y), entry by entry where the user gave vectors */
+/* 1/max(atol, rtol y), entry by entry if the user gave vectors of tolerances */
 struct Tolerances {
   PetscReal          a, r;
   const PetscScalar *va = nullptr, *vr = nullptr;
@@ -44,15 +44,16 @@ PetscErrorCode ReduceNorm(TS ts, NormType type, PetscReal local, PetscReal *norm
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first weights. Also the size below which a correction is rounding of q, and the number of entries that enter the norm
-   (p in (27)): what is 0 as yet and has a relative tolerance alone is one of them (Options.RelativeToleranceOfWhatIsZeroAtTheStart). What does not enter has a Y_i that it never exceeds, and so keeps its weight 0. */
+/* The first weights, the number p of entries in the norm (27), and the size below which a correction is rounding of q. An entry that
+   is 0 so far and has only a relative tolerance counts in p, too (Options.RelativeToleranceOfWhatIsZeroAtTheStart). Unknowns that are
+   not tested get the largest number as Y_i, so that their weight stays 0. */
 static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
 {
   Integrator &I        = Get(ts);
   PetscReal   local[3] = {0, 0, 0}, global[3];
 
   PetscFunctionBegin;
-  if (!I.norm_size) PetscCall(ForSome(I.rotations.at, [](PetscInt, PetscScalar &y) { std::fill_n(&y, 3, 1); }, Write(I.ymax))); /* a turn is rounded as the attitude is */
+  if (!I.norm_size) PetscCall(ForSome(I.rotations.at, [](PetscInt, PetscScalar &y) { std::fill_n(&y, 3, 1); }, Write(I.ymax))); /* rounding of a rotation vector is that of the attitude, of size 1 */
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar u, PetscScalar &y, PetscScalar &w) {
       if (!IsDifferential(RoleOf(I, i))) {
@@ -70,7 +71,7 @@ static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
   I.norm_size = (PetscInt)(global[1] + 0.5);
   PetscCheck(global[2] > 0, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
              "No unknown enters the error test: there is neither a coordinate nor a first-order state with a tolerance above 0 (-ts_rtol, -ts_atol). Where all are 0 at the start, a relative tolerance is none: -ts_atol says how small is small");
-  /* rounding of q moves a by eps |q| / (beta h^2), and with it the estimate by this much, at any h */
+  /* Rounding of q changes a by eps |q| / (beta h^2), and so the error estimate k h^2 (a_{n+1} - a_n) by an amount that does not depend on h */
   I.corrector.floor = 4 * PetscAbsReal(I.p.k) / I.p.beta * PETSC_MACHINE_EPSILON * PetscSqrtReal(global[0] / I.norm_size);
   if (I.corrector.floor > CorrectorTolerance(I))
     PetscCall(PetscInfo(ts, "the tolerance is so small that rounding of q stops the corrector at %g of it\n", (double)I.corrector.floor));
@@ -100,7 +101,7 @@ PetscErrorCode UpdateWeights(TS ts, Vec U, bool all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before a step from U: where the user has set other tolerances since the last one, all weights are made anew */
+/* Before a step from U: if the user has changed the tolerances since the last step, makes all weights anew */
 PetscErrorCode FollowTolerances(TS ts, Vec U)
 {
   Integrator      &I     = Get(ts);
@@ -124,8 +125,8 @@ PetscErrorCode FollowTolerances(TS ts, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From this rank's sum of squares of a correction by the weights to its norm. Multipliers have no weight, but must be numbers: 0
-   times Inf or NaN is NaN. */
+/* The norm of a correction from this rank's sum of squares of its weighted entries. The weight of multipliers is 0, but if one of
+   them is not finite, nor is the norm: 0 times Inf or NaN is NaN. */
 PetscErrorCode ReduceCorrection(TS ts, Vec dX, PetscReal sum, PetscReal h, PetscReal *e)
 {
   Integrator     &I = Get(ts);
@@ -148,7 +149,7 @@ PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal h, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* to = dX times the squares of its weights: a product with it is that of corrections, whose norm is CorrectionNorm() but for a factor */
+/* to = dX times the squares of the weights: VecDot() with it is the inner product whose norm is CorrectionNorm() up to a factor */
 PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to)
 {
   PetscFunctionBegin;
@@ -157,11 +158,11 @@ PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (26) of the coordinates: the sum of squares, or the largest, on this rank. a_n as in PrepareStage(). */
+/* (26) of the coordinates: the sum of squares, or the maximum, on this rank. The lag of a_n is stretched to h as in PrepareStage(). */
 static PetscErrorCode CoordinateErrors(const Integrator &I, NormType type, PetscReal *result)
 {
   const PetscReal h = I.h, k = PetscAbsReal(I.p.k) * h * h, r = I.h_last > 0 ? h / I.h_last : 1;
-  const bool      states  = I.count[TSHHT3_STATE]; /* whose weights are not meant; others have none */
+  const bool      states  = I.count[TSHHT3_STATE]; /* states have weights, too, and are skipped; all other unknowns have weight 0 */
   PetscReal       largest = 0;
   Sum             sum;
 
@@ -178,7 +179,7 @@ static PetscErrorCode CoordinateErrors(const Integrator &I, NormType type, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same of first-order states, added; their third derivative wants the step before the last */
+/* Adds the error of first-order states, whose third derivative needs s' at t_{n-1} */
 static PetscErrorCode AddStateErrors(const Integrator &I, NormType type, PetscReal *result)
 {
   const PetscReal h = I.h;
@@ -218,7 +219,7 @@ PetscErrorCode TSEvaluateWLTE_HHT(TS ts, NormType type, PetscInt *order, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The estimate of an accepted step in TSAdapt's norm, for the corrector's tolerance in the next one: TSAdapt has usually asked for it */
+/* Keeps the error estimate of an accepted step for the corrector's tolerance in the next one. Usually TSAdapt has computed it already. */
 PetscErrorCode NoteError(TS ts)
 {
   Integrator &I = Get(ts);

@@ -1,6 +1,6 @@
 /*
-  One run of SNES: the full step as a line search, the judgement of corrections (judge.cpp) as its convergence test, and the explanation
-  of what went wrong. A user's line search, convergence test, lag or type stands.
+  One run of SNES: the full step as a line search, the judgement of corrections (judge.cpp) as the convergence test, and messages about
+  failures. A line search, convergence test, lag or type that the user has set is not changed.
 */
 #include "corrector.h"
 #include "integrator/entries.h"
@@ -18,8 +18,8 @@ namespace hht3
 namespace
 {
 
-/* The full step, and no residual after the last one: (40) needs the correction alone. The judgement is handed to SNES by
-   SNESConverged_HHT(). */
+/* The line search: takes the full step and judges the correction. As (40) needs the correction alone, the residual after the last
+   one is not evaluated. SNESConverged_HHT() hands the judgement to the SNES. */
 PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
 {
   TS          ts = (TS)ctx;
@@ -40,7 +40,7 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   monitors = snes->numbermonitors;
   if (!I.corrector.reason || monitors || I.corrector.user_test) {
     if (!evaluated) PetscCall(SNESComputeFunction(snes, X, F));
-    if (monitors || I.corrector.user_test) PetscCall(VecNorm(F, NORM_2, &fnorm)); /* a residual that is not a number shows in the next correction */
+    if (monitors || I.corrector.user_test) PetscCall(VecNorm(F, NORM_2, &fnorm)); /* otherwise not needed: if the residual is not finite, nor is the next correction */
   }
   if (I.corrector.user_test) {
     PetscCall(VecNorm(X, NORM_2, &xnorm));
@@ -50,7 +50,8 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* SNES ended without our judgement: a residual or a linear solve that went wrong, or a user's own test */
+/* Writes the reason of a failure into I.failure. EndDiverged() has done so already for SNES_DIVERGED_DTOL; left are a residual that
+   is not finite, a failed linear solve, and other reasons of SNES, such as those of a user's test. */
 PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
 {
   Integrator &I = Get(ts);
@@ -72,8 +73,9 @@ PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The correction that a SNES has made without our line search. Newton's method leaves it behind; of others the iterate before is kept. Theirs may be
-   shortened, by a trust region or a mixing parameter: then what is left is told by the correction that the matrix would make next. */
+/* Judges the correction that a SNES has made without the line search of this file. SNESNEWTONLS keeps its correction; for other types the
+   difference to the iterate before is taken. This may have been shortened, by a trust region or a mixing parameter: so it counts for at least as
+   much as the correction that the matrix would make next. */
 PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
 {
   Integrator &I = Get(ts);
@@ -105,9 +107,10 @@ PetscErrorCode MeasureCorrection(TS ts, SNES snes, PetscInt it)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A SNES type that asks for no convergence test of ours (ksponly) has counted by itself. How well the matrix served is not known:
-   where the problem is not linear, the next step gets a new one. If it has never asked for any test, it is open whether the equations of the step hold: one linear
-   solve is the user's word that they do. */
+/* After a SNES type that does not call SNESConverged_HHT(): takes over its number of iterations. The rate of convergence is not
+   known, so that the next step gets a new matrix unless the problem is linear. If no convergence test was called at all, nothing
+   shows that the equations of the step hold. That is an error, but for SNESKSPONLY, with which the user asserts that one linear solve
+   suffices. */
 PetscErrorCode CountForeign(TS ts, PetscBool solved)
 {
   Integrator &I = Get(ts);
@@ -130,7 +133,7 @@ PetscErrorCode CountForeign(TS ts, PetscBool solved)
 
 } // namespace
 
-/* SNES's test. Where a line search other than ours is in place the correction has not been judged yet. */
+/* The convergence test of the SNES. With a line search other than FullStep() the correction has not been judged yet. */
 PetscErrorCode SNESConverged_HHT(SNES snes, PetscInt it, PetscReal, PetscReal, PetscReal, SNESConvergedReason *reason, void *ctx)
 {
   TS          ts = (TS)ctx;
@@ -142,7 +145,8 @@ PetscErrorCode SNESConverged_HHT(SNES snes, PetscInt it, PetscReal, PetscReal, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a residual, the first of all, and the state at t to which it belongs are numbers, named if not */
+/* Whether all the vectors, of which the first is a residual at t and the others its state, are finite; if not, I.failure names the
+   row of the residual */
 PetscErrorCode CheckNumbers(TS ts, PetscReal t, std::initializer_list<Vec> all, PetscBool *ok)
 {
   PetscFunctionBegin;
@@ -167,13 +171,13 @@ PetscErrorCode CorrectorSetUp(TS ts)
   PetscCall(TSGetSNES(ts, &snes));
   PetscCheck(!snes->mf || snes->mf_operator, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
              "-snes_mf leaves no matrix, which the consistent start needs; use -snes_mf_operator, whose preconditioner is the assembled matrix");
-  /* before SNESSetType(), which gives backtracking to a line search without a type: TSSetFromOptions() need not have been called */
+  /* Before SNESSetType(), which sets the type of the line search to backtracking if it has none, as when TSSetFromOptions() was not called */
   PetscCall(HooksLineSearch(ts));
   if (!((PetscObject)snes)->type_name) PetscCall(SNESSetType(snes, SNESNEWTONLS));
   PetscCall(HooksInstall(ts));
   PetscCall(SNESGetLineSearch(snes, &ls));
   PetscCall(PetscObjectTypeCompare((PetscObject)ls, SNESLINESEARCHSHELL, &shell));
-  if (!shell) I.hooks.line_search = PETSC_FALSE; /* an option has named another */
+  if (!shell) I.hooks.line_search = PETSC_FALSE; /* an option has set another type */
   if (I.hooks.line_search) PetscCall(SNESLineSearchShellSetApply(ls, FullStep, ts));
   PetscCall(TakeSNESSettings(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -185,8 +189,9 @@ static void BeginIteration(Integrator &I)
   I.corrector.matrix.fresh               = PETSC_FALSE;
 }
 
-/* Trust regions and line searches compare norms of residuals. They end in failure, or shorten corrections to nothing, where these are rounding or where
-   the way to the solution is not downhill. Then full steps with the matrix at hand, judged as any other, tell whether the equations hold. */
+/* Trust regions and line searches compare norms of residuals. Where these norms are rounding, or do not decrease on the way to the
+   solution, they fail or shorten corrections to nothing. Then full steps with the present matrix, judged as usual, show whether the
+   equations hold. */
 static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
 {
   Integrator     &I     = Get(ts);
@@ -222,7 +227,7 @@ static PetscErrorCode FinishWithFullSteps(TS ts, SNESConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One run of SNES from the present X. A new matrix is asked for by want_matrix. */
+/* One run of SNES from the present X, with a new matrix if corrector.matrix.want */
 PetscErrorCode RunSNES(TS ts, PetscBool *ok)
 {
   Integrator         &I = Get(ts);
@@ -235,10 +240,10 @@ PetscErrorCode RunSNES(TS ts, PetscBool *ok)
   PetscFunctionBegin;
   BeginIteration(I);
   c.user_test = HooksUserTest(ts);
-  if (ts->snes->lagjacobian > 0) c.user_lag = PETSC_TRUE; /* since the set-up */
+  if (ts->snes->lagjacobian > 0) c.user_lag = PETSC_TRUE; /* the user has set a lag after the set-up */
   if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.matrix.want ? -2 : -1));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_TRUE)); /* corrections remove each other's errors, at a rate that is measured */
+  if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_TRUE)); /* rough solves suffice: each correction removes the error of the last one, and the rate is measured */
   ts->snes->jacobiandomainerror = PETSC_FALSE; /* PETSc 3.18 never clears it: one singular matrix would fail all later solves */
   const PetscErrorCode failed = SNESSolve(ts->snes, NULL, I.X);
   if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_FALSE));
@@ -246,7 +251,7 @@ PetscErrorCode RunSNES(TS ts, PetscBool *ok)
   PetscCall(failed);
   PetscCall(SNESGetConvergedReason(ts->snes, &reason));
   PetscCall(FinishWithFullSteps(ts, &reason));
-  if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, -1)); /* after FreshMatrices() */
+  if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, -1)); /* FreshMatrices() may have set 1 */
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &its));
   ts->ksp_its += its;
   PetscCall(GiveUpKrylov(ts, &other));

@@ -1,5 +1,4 @@
-/* The longest step that the application allows: what the estimate cannot see, because nothing of it shows at the ends
- * of the step. */
+/* The longest step that the application allows, for events within a step that do not show at its ends and so not in the error estimate */
 #include "estimate.h"
 
 namespace hht3
