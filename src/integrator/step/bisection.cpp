@@ -1,9 +1,9 @@
 /*
-  Corrections that turn back. A force that is steep about one velocity and flat on both sides of it, as dry friction is, throws Newton's
-  iteration from one side to the other: on either side the matrix knows nothing of the steep part, and each correction is the last one
-  with the other sign. The solution lies between the two iterates. It is looked for on the line that joins them, by the sign of what the
-  next correction with the same matrix would be (the natural level function of Deuflhard, Newton Methods for Nonlinear Problems, 2004,
-  section 3.3); there a new matrix sees the steep part.
+  Corrections of alternating direction. With a force that is steep about one velocity and flat on both sides of it, as dry friction is, Newton's
+  iteration jumps from one side to the other: the matrices of both sides do not contain the steep part, and each correction is about the negative
+  of the last one. The solution lies between the two iterates. Bisection on the line between them finds it by the sign of the
+  next correction with the same matrix (the natural level function of Deuflhard, Newton Methods for Nonlinear Problems, 2004,
+  section 3.3). A new matrix made there contains the steep part.
 */
 #include "corrector.h"
 #include "estimate.h"
@@ -15,15 +15,15 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal even_middle  = 0.1; /* a middle so far from the mean of both ends, of their difference: the steep part is met */
-constexpr int       max_halvings = 60; /* beyond rounding: the force jumps */
+constexpr PetscReal even_middle  = 0.1; /* phi changes evenly if its value in the middle is the mean of those at the ends to within this part of their difference */
+constexpr int       max_halvings = 60; /* then the interval is rounding, and the force jumps */
 
-/* What the iterates of the line X(s) = X(0) - s dX share */
+/* The line X(s) = X(0) - s dX */
 struct Line {
-  Vec X, dX, begin, along, next; /* begin: X(0); along: dX weighted as in the norm of corrections; next: work */
+  Vec X, dX, begin, along, next; /* begin: X(0); along: dX weighted as in the norm of corrections; next: work space */
 };
 
-/* along * the correction that the matrix would make at X(s); F: the residual there. Not a number if it makes none. */
+/* *phi: inner product of dX and the correction that the present matrix would make at X(s), NAN if the solve fails. F: the residual there. */
 PetscErrorCode NextAlong(TS ts, const Line &l, PetscReal s, Vec F, PetscReal *phi)
 {
   PetscScalar dot;
@@ -38,8 +38,8 @@ PetscErrorCode NextAlong(TS ts, const Line &l, PetscReal s, Vec F, PetscReal *ph
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bisection between s = 0, where phi is `begin`, and s = 1, where it has to be negative, until phi changes evenly between the ends: while the
-   steep part lies between flat ones, the middle is about as far as one of the ends */
+/* Bisection between s = 0, where phi is `begin`, and s = 1, where it has to be negative, until phi changes evenly between the ends.
+   As long as the interval contains flat parts beside the steep one, phi in the middle is about that at one of the ends. */
 PetscErrorCode Bisect(TS ts, const Line &l, PetscReal begin, Vec F, PetscReal *s, PetscBool *found)
 {
   PetscReal low = 0, high = 1, at_low = begin, at_high = 0, phi = 0;
@@ -61,8 +61,8 @@ PetscErrorCode Bisect(TS ts, const Line &l, PetscReal begin, Vec F, PetscReal *s
 
 } // namespace
 
-/* The correction dX has led to X. If the next one turns back, X is moved to where the two meet, and F is the
-   residual there. */
+/* After the correction dX, which has led to X: if the next one has the opposite direction, moves X to the zero between them; F is then the
+   residual there */
 PetscErrorCode BisectIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
 {
   Integrator &I = Get(ts);
@@ -73,7 +73,7 @@ PetscErrorCode BisectIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
   PetscFunctionBegin;
   *found = PETSC_FALSE;
   for (WorkVec *v : {&begin, &along}) PetscCall(v->like(X, I.spare));
-  PetscCall(next.like(X)); /* a user may have zeros taken for a first guess */
+  PetscCall(next.like(X)); /* zeros, as the user may have set KSPSetInitialGuessNonzero() */
   PetscCall(VecWAXPY(begin, 1, dX, X));
   PetscCall(WeightCorrection(I, dX, along));
   PetscCall(VecDot(along, dX, &moved));

@@ -1,22 +1,22 @@
 /*
   Velocities when h changes.
 
-  The method satisfies Phi = 0, and Phi_q q' + Phi_t = 0 only to C h^2. While h is constant so is that drift of the velocities, and nobody
-  notices. When h changes from h_n to h it has to become C h^2 within one step, which takes normal accelerations of
-  C (h_n^2 - h^2)/h: a spike of first order in q'' and lambda, seen by whatever depends on them (outputs, states driven by
-  accelerations), and by the error test of such states as an error that does not fall as it should.
+  The method satisfies Phi = 0, but Phi_q q' + Phi_t = 0 only up to a drift C h^2. While h is constant, so is this drift of the velocities, and it does
+  no harm. When h changes from h_n to h, the drift has to become C h^2 within one step, which takes accelerations of
+  C (h_n^2 - h^2)/h normal to the constraints: a spike of first order in q'' and lambda. It shows in all that depends on these (outputs, states driven by
+  accelerations), and in the error test of such states as an error that does not decrease with h as it should.
 
-  So the part 1 - (h/h_n)^2 of the drift is taken out of q'_n before a step of a new length: dV from
-  [M^ Phi_q^T; Phi_q 0] [dV; mu] = [0; Phi_q q' + Phi_t], with the matrix at hand, since it need not be exact, and the right-hand side
-  from a central difference of Phi along the motion. Two residuals and one solve per change of h; nothing else. The reported
-  q'_n stays as it is.
+  So the part 1 - (h/h_n)^2 of the drift is subtracted from q'_n before a step of a new length. The drift dV follows from
+  [M^ Phi_q^T; Phi_q 0] [dV; mu] = [0; Phi_q q' + Phi_t], with the present Newton matrix, since it need not be exact, and the right-hand side
+  from a central difference of Phi along the motion. A change of h costs two residuals and one solve. The reported
+  q'_n does not change.
 
-  A start, SetDriftOfStart(), puts in that drift, which consistent velocities do not have.
+  Consistent velocities of a start have no drift: SetDriftOfStart() adds it.
 
-  A change of coordinates bends the motion: (2a) misses q by k h^3 q''', which Phi = 0 does not allow in the normals' directions,
-  and that is the drift, -k h^2 (q''')_normal. While velocities follow the new coordinates Q as tangents, Q'_n = T q'_n, the third
-  derivative has terms of its own, Q''' = T q''' + d (history.cpp), and the drift has to grow by -k h^2 d_normal, or there is the
-  spike again. d_normal comes from d as dV does from q'_n, with Phi_q d by a central difference along d.
+  The drift is -k h^2 (q''')_normal: (2a) misses q by k h^3 q''', which Phi = 0 does not allow in the directions normal to the constraints.
+  (k is jerk_factor() of formulas.h.) A change of coordinates maps velocities as tangents, Q'_n = T q'_n, but the third
+  derivative gets additional terms, Q''' = T q''' + d (history.cpp), so that the drift has to grow by -k h^2 d_normal; otherwise there is a
+  spike again. d_normal follows from d as dV does from q'_n, with Phi_q d by a central difference along d.
 */
 #include "integrator/entries.h"
 #include "integrator/equations/equations.h"
@@ -31,8 +31,9 @@ namespace hht3
 namespace
 {
 
-/* Relative changes of h that are worth it. First-order states in the error test see the spike of smaller ones, as does whoever reads the multipliers where a run
-   ends (Analyses.KinematicsOfAFourBar), and without damping the multipliers' oscillation is a spike that grows by 1/(1-rho). */
+/* The smallest relative change of h for which velocities are corrected. A smaller one is needed with first-order states, whose error
+   test shows the spike; at the end of a run, where multipliers are read (Analyses.KinematicsOfAFourBar); and with little damping,
+   where the multipliers' oscillation amplifies the spike by 1/(1-rho). */
 PetscReal LeastChangeOfStep(TS ts)
 {
   const Integrator &I     = Get(ts);
@@ -42,8 +43,9 @@ PetscReal LeastChangeOfStep(TS ts)
   return I.count[TSHHT3_STATE] || last ? least : PetscMax(least, 0.1 * RelativeDamping(I.p.rho));
 }
 
-/* The solution's part in the coordinates for a right-hand side gamma, zero where it cannot be had. The factors at hand serve, though those of a start have met
-   the matrix of its rates since (Statistics.FactorizationsOfAStart); they may be those with which the last correction failed, as the matrix was singular: then others. */
+/* dV: the coordinates' part of the solution for the right-hand side gamma, zero if the solve fails. The present factors are used even
+   though the matrix has changed since: after a start it is that of the rates (Statistics.FactorizationsOfAStart). If they are the
+   factors of a singular matrix, with which the last correction failed, the matrix of a start at t_n is factored. */
 PetscErrorCode SolveNormal(TS ts, Vec dV)
 {
   Integrator &I = Get(ts);
@@ -66,7 +68,8 @@ PetscErrorCode SolveNormal(TS ts, Vec dV)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gamma: the derivative of holonomic constraints at t_n along a direction, and by time where it is that of the motion, as a central difference over tau */
+/* gamma: the derivative of the holonomic constraints at t_n along `direction`, with_time also that with respect to time, as a central
+   difference over tau */
 PetscErrorCode ChangeOfConstraints(TS ts, Vec direction, PetscReal tau, bool with_time)
 {
   Integrator &I = Get(ts);
@@ -83,7 +86,7 @@ PetscErrorCode ChangeOfConstraints(TS ts, Vec direction, PetscReal tau, bool wit
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From d to its normal part, in place. Phi is followed over a length that shows above its rounding. */
+/* Replaces d in normal_jerk by its normal part. The difference of Phi is over a length that is well above rounding. */
 PetscErrorCode MakeJerkNormal(TS ts)
 {
   Integrator &I = Get(ts);
@@ -103,7 +106,7 @@ PetscErrorCode MakeJerkNormal(TS ts)
 
 } // namespace
 
-/* dV at t_n. U1, A1, gamma and work serve as work space; the correction has not begun. */
+/* Measures dV at t_n. Uses U1, A1, gamma and work as work space, and so must not be called during the iteration. */
 PetscErrorCode MeasureDrift(TS ts)
 {
   Integrator     &I   = Get(ts);
@@ -117,8 +120,8 @@ PetscErrorCode MeasureDrift(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A consistent start has no drift where the method wants -k h^2 (q''')_normal: the first step would make it good by an
-   oscillation of the multipliers, which at little damping takes many steps to die out. With the matrix of the start. */
+/* A consistent start has no drift, but the method's is -k h^2 (q''')_normal. The first step would produce it by an
+   oscillation of the multipliers, which with little damping takes many steps to decay. `rate` is q'''; the factors are those of the start. */
 PetscErrorCode SetDriftOfStart(TS ts, Vec rate)
 {
   Integrator &I = Get(ts);
@@ -131,7 +134,7 @@ PetscErrorCode SetDriftOfStart(TS ts, Vec rate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For a step of length I.h after one of h_last */
+/* Corrects the velocities at t_n for a step of length I.h after one of h_last, see above */
 PetscErrorCode AdaptVelocities(TS ts)
 {
   Integrator     &I = Get(ts);

@@ -50,7 +50,7 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the reason of a failure into I.failure. EndDiverged() has done so already for SNES_DIVERGED_DTOL; left are a residual that
+/* Writes the reason of a failure into I.failure. judge.cpp has done so already for SNES_DIVERGED_DTOL; left are a residual that
    is not finite, a failed linear solve, and other reasons of SNES, such as those of a user's test. */
 PetscErrorCode ExplainSNES(TS ts, SNESConvergedReason reason)
 {

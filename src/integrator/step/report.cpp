@@ -1,4 +1,4 @@
-/* What a run says about itself: the summary line and the progress line. Both are TS monitors. */
+/* The summary line (-ts_hhtdae_summary) and the progress line (-ts_hhtdae_progress) of a run. Both are TS monitors. */
 #include "step.h"
 #include <chrono>
 #include <ctime>
@@ -14,7 +14,7 @@ PetscReal ProcessorTime() { return (PetscReal)std::clock() / CLOCKS_PER_SEC; }
 
 } // namespace
 
-/* Of what the run has taken before, in an earlier TSSolve() or in the process that wrote its checkpoint, the statistics know */
+/* The statistics contain the time that the run has taken before, in an earlier TSSolve() or in the process that wrote its checkpoint */
 void StartClocks(Integrator &I)
 {
   if (I.timed) return;
@@ -31,7 +31,7 @@ void StopClocks(Integrator &I, bool stop)
   I.timed     = (PetscBool)!stop;
 }
 
-/* TSSolve() calls its monitors a last time with the reason set, and that is when the line is due */
+/* Prints when TSSolve() calls its monitors the last time, which is with the reason set */
 PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
 {
   PetscFunctionBegin;
@@ -51,7 +51,7 @@ PetscErrorCode MonitorSummary(TS ts, PetscInt step, PetscReal, Vec, void *)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One line, rewritten four times a second, with what is left of the run at its average rate */
+/* One line, rewritten four times a second, with the time that the rest of the run takes at its average rate */
 PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec, void *)
 {
   FILE *out = PETSC_STDERR;

@@ -1,6 +1,6 @@
 /*
-  The size of a correction that is nothing but rounding. Only the residual knows how its terms cancel, and only the matrix how much of
-  that arrives in the unknowns: where Phi_q nearly loses rank, that is far more than rounding of q, and a step later it is not.
+  The size of corrections that rounding makes. Rounding of the residual depends on how its terms cancel, and its effect on the unknowns on the
+  matrix: where Phi_q nearly loses rank it is far above rounding of q, and a step later no longer. So both are measured at the iterate.
 */
 #include "corrector.h"
 #include "integrator/entries.h"
@@ -12,7 +12,7 @@
 namespace hht3
 {
 
-/* The correction that the matrix at hand makes of a residual r, to rounding: no other one follows */
+/* dX = J^{-1} r with the present Newton matrix, by an accurate solve, as no further correction follows that would remove its error */
 PetscErrorCode CorrectionFor(TS ts, Vec r, Vec dX, PetscBool *solved)
 {
   KSP                ksp;
@@ -33,7 +33,7 @@ PetscErrorCode CorrectionFor(TS ts, Vec r, Vec dX, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Its size; 0 if it has none */
+/* Its size in units of the tolerance; 0 if the solve fails */
 PetscErrorCode SizeOfCorrectionFor(TS ts, Vec r, Vec dX, PetscReal *e)
 {
   PetscBool solved;
@@ -46,9 +46,10 @@ PetscErrorCode SizeOfCorrectionFor(TS ts, Vec r, Vec dX, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* e of rounding at the iterate X, in units of the tolerance: the larger of two samples, since in one of them the rows may cancel
-   (Stiff.FastModeBesideASlowOne). The noise of the residual is taken with random factors, row by row: rounding of one row knows nothing of that of another. (A residual of
-   unknowns that have been moved a little is taken back to them by the matrix, however near to singular it is.) */
+/* The size e of corrections that rounding of the residual makes at X, in units of the tolerance: the larger of two samples, since in
+   a single one rows may cancel (Stiff.FastModeBesideASlowOne). Each row of the residual's rounding gets a random factor of its own,
+   as rounding errors of different rows are independent. (The difference of two residuals, at X and at slightly changed unknowns,
+   would not do: the solve returns just this small change, however near to singular the matrix is.) */
 PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
 {
   WorkVec   F, noise, r;

@@ -1,8 +1,8 @@
 /*
-  U1, V1, A1: the state at t_{n+1} that belongs to the unknowns X, by (2) and by the average that the form asks for.
+  The stage: the state U1, V1, A1 at t_{n+1} as a function of the unknowns X, by (2) and by the average of accelerations of the form (formulas.h).
 
-  What does not depend on X, the base, is made once per step. A correction, its norm and the new stage come in one sweep (sweeps.h): as
-  VecAXPY() and three plain loops they take 10 % of the instructions of a step more, and 3 % of its time, for a chain of 1,000 rods.
+  The part that does not depend on X, the base, is computed once per attempt. A correction, its norm and the new stage are computed in one sweep
+  (sweeps.h): VecAXPY() and three plain loops take 10 % of the instructions of a step more, and 3 % of its time, for a chain of 1,000 rods.
 */
 #include "integrator/entries.h"
 #include "estimate.h"
@@ -17,7 +17,8 @@ namespace hht3
 namespace
 {
 
-/* q'_n less the part of its drift that a step of another length has to lose, and with what a start or a change of coordinates adds, drift.cpp */
+/* v: the velocities at t_n that the step starts from, q'_n without the part of its drift that a step of another length must not have,
+   and with the drift that a start or a change of coordinates lacks, drift.cpp */
 PetscErrorCode VelocitiesAtBegin(const Integrator &I, Vec v)
 {
   PetscFunctionBegin;
@@ -27,7 +28,7 @@ PetscErrorCode VelocitiesAtBegin(const Integrator &I, Vec v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U1, V1, A1 = base + X times their derivatives by X; of what is no coordinate U1 is X itself */
+/* U1, V1, A1 = base + (kq, kv, ka) X for coordinates; for other unknowns U1 = X. States are treated by StageOfStates(). */
 struct Stage {
   PetscReal          kq, kv, ka;
   const float       *moves; /* null: all are coordinates */
@@ -54,7 +55,7 @@ struct GivenStage {
   HHT3_INLINE void operator()(const At &at) const { stage(at, at.get(x)); }
 };
 
-/* The same after X = X - d, and the squares of d by the weights */
+/* The same after X = X - d, with the sum of squares of the weighted d */
 struct CorrectedStage {
   Stage              stage;
   const PetscScalar *d, *w;
@@ -71,7 +72,7 @@ struct CorrectedStage {
   }
 };
 
-/* sweep(n, stage), which has the arrays of the stage and those of `more` */
+/* Calls sweep(n, stage) with access to the arrays of the stage and of `more` */
 template <class F, class... More>
 PetscErrorCode ForStage(const Integrator &I, F sweep, More &...more)
 {
@@ -103,7 +104,7 @@ PetscErrorCode StageOfStates(const Integrator &I, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After the sweep: states, rotation vectors, and a note that U1, V1, A1 belong to X */
+/* After the sweep: states, rotation vectors, and the note that U1, V1, A1 belong to X */
 PetscErrorCode FinishStage(Integrator &I, Vec X)
 {
   PetscFunctionBegin;
@@ -133,7 +134,7 @@ PetscErrorCode StageVectors(TS ts, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* X = X - dX, the norm of dX by which the corrector judges it, and U1, V1, A1 that belong to the new X, in one sweep */
+/* X = X - dX, the norm of dX by which the corrector judges it, and U1, V1, A1 of the new X, in one sweep */
 PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
 {
   Integrator &I = Get(ts);
@@ -148,10 +149,10 @@ PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To be called when h, t_n's state or the drift of its velocities have changed, before the first residual. The parts of U1, V1, A1 that do not depend on
-   X come from (2) and from the average that the form asks for. a_n and w_n were made by a step of length h_last; their lag behind the true values is stretched
-   to the present h, without which a change of h costs an order (Bruels, Arnold 2008). In the paper's form a_n is itself what counts as the true
-   value, so that nothing changes. */
+/* Computes the parts of U1, V1, A1 that do not depend on X, by (2) and the average of the form. To be called before the first
+   residual, and whenever h, the state at t_n or the drift of its velocities have changed. a_n and w_n belong to a step of length
+   h_last; their lag behind the true values q''_n and s'_n is stretched to the present h, without which a change of h costs an order
+   (Bruels, Arnold 2008). In the paper's form a_n is the true value itself, so that this changes nothing. */
 PetscErrorCode PrepareStage(TS ts)
 {
   Integrator       &I     = Get(ts);
@@ -170,7 +171,7 @@ PetscErrorCode PrepareStage(TS ts)
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar u0, PetscScalar v0, PetscScalar a0, PetscScalar x0, PetscScalar &u, PetscScalar &v, PetscScalar &a) {
       const TSHHT3Role  role  = RoleOf(I, i);
-      const PetscScalar begin = v; /* q'_n as the step takes it */
+      const PetscScalar begin = v; /* of VelocitiesAtBegin() */
       u = v = a = 0;
       if (role == TSHHT3_COORDINATE) {
         const PetscScalar an = a0 + r * (x0 - a0);

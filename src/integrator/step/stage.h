@@ -1,4 +1,5 @@
-/* U1, V1, A1 of the unknowns X, (2), in stage.cpp; and the drift of the velocities at t_n off the constraints, drift.cpp. */
+/* The stage U1, V1, A1 as a function of the unknowns X, (2), stage.cpp; the drift of the velocities at t_n off the velocity
+   constraints, drift.cpp. */
 #ifndef HHTDAE_STAGE_H
 #define HHTDAE_STAGE_H
 
@@ -16,10 +17,11 @@ PetscErrorCode StageVectors(TS ts, Vec X);
 /* X = X - dX with U1, V1, A1 of the new X, and the norm of dX as CorrectionNorm() has it, in one sweep */
 PetscErrorCode SubtractCorrection(TS ts, Vec X, Vec dX, PetscReal *e);
 
-/* The velocities at t_n for a step of length I.h after one of length h_last */
+/* Corrects the velocities at t_n for a step of length I.h after one of length h_last */
 PetscErrorCode AdaptVelocities(TS ts);
 
-/* That drift: the one that the method wants at a consistent start, from the rates of the accelerations, and dV at t_n in the course of a run */
+/* The drift that a step of the method would have left at a consistent start, from the rates of the accelerations; and the measured
+   drift dV at t_n */
 PetscErrorCode SetDriftOfStart(TS ts, Vec rate);
 PetscErrorCode MeasureDrift(TS ts);
 

@@ -1,4 +1,4 @@
-/* One step, step.cpp; and what a run says of itself, report.cpp: clocks, and the monitors of -ts_hhtdae_summary and -ts_hhtdae_progress. */
+/* One step, step.cpp; the clocks and the monitors of -ts_hhtdae_summary and -ts_hhtdae_progress, report.cpp. */
 #ifndef HHTDAE_STEP_H
 #define HHTDAE_STEP_H
 
@@ -10,7 +10,8 @@ namespace hht3
 PetscErrorCode TSStep_HHT(TS ts);
 PetscErrorCode TSRollBack_HHT(TS ts);
 
-/* The clocks of the statistics run from the first step of a solve on; their time into the statistics, and whether they stop with that */
+/* The clocks of the statistics run from the first step of a solve on. StopClocks() writes their time into the statistics, and stops
+   them if `stop`. */
 void StartClocks(Integrator &I);
 void StopClocks(Integrator &I, bool stop);
 
