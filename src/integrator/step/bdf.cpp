@@ -1,12 +1,13 @@
 /*
-  Steps of order 3 to 5: the accepted states that they need, the stage that follows from these, and the way from and to HHT, the member of order two.
+  Steps of order 3 to 5: the accepted states that they need, the stage that follows from these, and the changes from and to HHT, the
+  method of order two.
 
-  HHT's unknown is an acceleration a that lags behind q'' and its velocities miss the differentiated constraints by O(h^2), drift.cpp; backward
-  differentiation has neither. Where the order goes from two to three, the drift is taken out of the velocities of the history, or accelerations in the directions of the
-  constraints, and with them multipliers, would be off by an error of first order for as many steps as the history has. Where it comes back, a_n
-  and the drift are put in as at a start.
+  HHT's unknown is an acceleration a that lags behind q'', and its velocities miss the differentiated constraints by O(h^2),
+  drift.cpp; backward differentiation has neither. When the order rises from two to three, this drift is subtracted from the
+  velocities of the history. Otherwise accelerations in the directions of the constraints, and with them the multipliers, would have
+  an error of first order for as many steps as the history has. When the order falls to two, a_n and the drift are made as at a start.
 
-  A step far shorter than the one before, as to an event or the end of a run, does not lengthen the history: its beginning is left out.
+  After a step that is far shorter than the one before, as to an event or the end of a run, the state at its beginning is left out of the history.
 */
 #include "integrator/entries.h"
 #include "order.h"
@@ -22,11 +23,11 @@ namespace hht3
 namespace
 {
 
-/* A step below this part of the last one is too short to be differentiated over: what the corrector has left in the positions of its ends would
-   count so many times more in the velocities of the next one */
+/* A step shorter than this part of the last one is not used for differentiation: the error that the corrector leaves in the positions
+   at its ends would be magnified as much in the velocities of the next step. Table in tests/bench/README.md. */
 constexpr PetscReal short_step_ratio = 0.2;
 
-/* The multiple of dV in psi_v: that of a step of length h counts as (h/drift_h)^2 */
+/* The multiple of dV that psi_v contains: the drift at the end of a step of length h is taken for (h/drift_h)^2 dV */
 PetscReal DriftOfHistory(const Order &o, const BDF &b)
 {
   PetscReal sum = 0;
@@ -35,7 +36,7 @@ PetscReal DriftOfHistory(const Order &o, const BDF &b)
   return sum;
 }
 
-/* The predictor goes on from other accelerations at t_n, and with the slopes that it has */
+/* Shifts the accelerations of the predictor so that they are those of `a` at t_n; their slopes do not change */
 PetscErrorCode MovePredictor(Integrator &I, Vec a)
 {
   Predictor &p = I.predictor;
@@ -48,7 +49,8 @@ PetscErrorCode MovePredictor(Integrator &I, Vec a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before the first attempt of order three or more from a state of HHT's: accelerations are q'', and the drift of the velocities is measured */
+/* Before the first attempt of order three or more from a state that HHT has left: the predictor gets q'' in place of a, and the drift
+   of the velocities is measured */
 PetscErrorCode EnterBDF(TS ts)
 {
   Integrator &I = Get(ts);
@@ -65,7 +67,8 @@ PetscErrorCode EnterBDF(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before the first attempt of order two from a state of higher order's: what HHT would have left, from the slope of q'' */
+/* Before the first attempt of order two from a state that a higher order has left: makes a_n, w_n and the drift as HHT would have
+   left them, from the slope of q'' */
 PetscErrorCode LeaveBDF(TS ts)
 {
   Integrator &I = Get(ts);
@@ -132,7 +135,7 @@ PetscErrorCode ViewOrder(TS ts, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At a start: order two, and no history */
+/* At a start: order two, no history */
 void ResetOrder(TS ts)
 {
   Integrator &I = Get(ts);
@@ -144,14 +147,14 @@ void ResetOrder(TS ts)
   I.p                          = I.hht;
 }
 
-/* The accepted step is about to become t_n, its beginning a part of the past, and o.next the order */
+/* Called before the end of the accepted step becomes t_n: puts its beginning into the past and makes o.next the order */
 void CommitOrder(Integrator &I)
 {
   Order &o = I.order;
 
   if (o.max == 2) return;
   if (o.accepted > 0 && (o.past == 0 || I.h >= short_step_ratio * I.h_last)) {
-    /* U1, V1 take the place of what goes, and U0, V0 are the first of the past when they have been exchanged */
+    /* The oldest vectors are exchanged for U0, V0, which become the first ones of the past; CommitStep() then exchanges U0, V0 for U1, V1 */
     std::rotate(o.U, o.U + o.max - 1, o.U + o.max);
     std::rotate(o.V, o.V + o.max - 1, o.V + o.max);
     std::swap(o.U[0], I.U0);
@@ -170,7 +173,7 @@ void CommitOrder(Integrator &I)
   o.now    = PetscMin(o.next, PetscMax(2, o.past));
 }
 
-/* Keeps n states of the past */
+/* Keeps only n states of the past, and lowers the order if it needs more */
 PetscErrorCode CutPast(TS ts, PetscInt n)
 {
   Order &o = Get(ts).order;
@@ -185,7 +188,7 @@ PetscErrorCode CutPast(TS ts, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before an attempt of length I.h: parameters of its order */
+/* Before an attempt of length I.h: sets the parameters of its order, and prepares a change from or to order two */
 PetscErrorCode UseOrder(TS ts)
 {
   Integrator &I = Get(ts);
@@ -206,7 +209,8 @@ PetscErrorCode UseOrder(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* As PrepareStage() does it for order two: psi_q + gamma h psi_v of coordinates, psi_q of states and of rotation vectors, see StageOfRotations() */
+/* PrepareStage() of orders above two. The base of U1 is psi_q + gamma h psi_v for coordinates, and psi_q for states and for rotation
+   vectors, see StageOfRotations(). */
 PetscErrorCode PrepareBDF(TS ts)
 {
   Integrator        &I = Get(ts);
@@ -226,7 +230,7 @@ PetscErrorCode PrepareBDF(TS ts)
     PetscCall(VecGetArrayRead(V[j], &v[j]));
   }
   const auto psi = [&](const PetscScalar *const x[], PetscInt i, PetscScalar sum) {
-    for (PetscInt j = 0; j < o.now; j++) sum += b.c[j] * x[j][i]; /* not by VecMAXPY(), which rounds otherwise: HigherOrderRotations.ObservedOrders */
+    for (PetscInt j = 0; j < o.now; j++) sum += b.c[j] * x[j][i]; /* not by VecMAXPY(), whose rounding is different: HigherOrderRotations.ObservedOrders */
     return sum;
   };
   PetscCall(ForEntries(
@@ -249,7 +253,7 @@ PetscErrorCode PrepareBDF(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The past in new coordinates. What HHT has left in its velocities belongs to the old ones. */
+/* Maps the past to new coordinates. HHT's drift in its velocities was measured in the old ones, and is no longer subtracted. */
 PetscErrorCode MapPast(TS ts)
 {
   Integrator &I = Get(ts);
@@ -268,11 +272,11 @@ PetscErrorCode MapPast(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Steps of order two after a higher one has failed, doubled each time: where the corrector goes on to fail they would hide it, and where an oscillation comes back each
-   attempt at a higher order lets it grow */
+/* Number of steps of order two after a higher order has failed. It is doubled each time, as each attempt at a higher order may end in
+   another failure of the corrector, or lets an oscillation grow. */
 static constexpr PetscInt first_wait = 4;
 
-/* After so many times as many steps above order two as the last wait it begins anew */
+/* If there were this many times as many steps above order two as the last wait, the next wait is first_wait again */
 static constexpr PetscInt steps_to_forgive = 10;
 
 void LowerToTwo(Order &o)
@@ -281,7 +285,8 @@ void LowerToTwo(Order &o)
   o.next             = 2;
 }
 
-/* A correction has failed: prediction and history of high order lead far astray where a force has a corner, and order two is tried at once, at the same h */
+/* After a failed corrector iteration: where a force has a corner, prediction and history of high order are far off, so that order two
+   is tried at once, at the same h */
 PetscErrorCode LowerAfterFailure(TS ts)
 {
   Integrator &I = Get(ts);

@@ -1,5 +1,5 @@
 /*
-  Backward differentiation of positions and again of velocities, orders 3 to 5, as pure functions of the times of a history with variable steps.
+  Backward differentiation of positions and of velocities, orders 3 to 5, as pure functions of the times of a history with variable steps.
 
   With tau_j = t_{n+1} - t_{n+1-j}, j = 1 ... k, the derivative at t_{n+1} of the polynomial through q_{n+1} and the last k values is
 
@@ -9,12 +9,13 @@
 
     q'_{n+1} = psi_v + gamma h q''_{n+1},  q_{n+1} = psi_q + gamma h psi_v + (gamma h)^2 q''_{n+1}
 
-  which are (2a) and (2b) with beta = gamma^2 and other values in place of those of t_n: unknowns, matrix (10) and scalings stay. The equations of motion and
-  the constraints hold at t_{n+1}. The relation of the positions misses them by (Brenan, Campbell, Petzold 1996, section 5.2; Hairer, Norsett, Wanner, III.5)
+  which are (2a) and (2b) with beta = gamma^2 and other base values: unknowns, matrix (10) and scalings are those of order two. The
+  equations of motion and the constraints hold at t_{n+1}. The local error of the positions is (Brenan, Campbell, Petzold 1996,
+  section 5.2; Hairer, Norsett, Wanner, III.5)
 
-    gamma h tau_1 ... tau_k q[t_{n+1}, ..., t_{n-k}] = gamma h/tau_{k+1} (q_{n+1} - what the polynomial through the last k + 1 values predicts)
+    gamma h tau_1 ... tau_k q[t_{n+1}, ..., t_{n-k}] = gamma h/tau_{k+1} (q_{n+1} - extrapolation of the polynomial through the last k + 1 values)
 
-  On index 3 at constant steps, order k is that of q, q' and lambda (Loetstedt, Petzold, Math. Comp. 46, 1986). At variable steps a change of h leaves an error of
+  With index 3 and constant steps q, q' and lambda are of order k (Loetstedt, Petzold, Math. Comp. 46, 1986). A change of h leaves an error of
   order h^(k-1) in q'' and lambda for as many steps as the history has.
 */
 #ifndef HHTDAE_BDF_H
@@ -29,10 +30,10 @@ constexpr PetscInt max_order = 5;
 
 struct BDF {
   PetscReal gh;           /* gamma h */
-  PetscReal c[max_order]; /* of the values at t_n, t_{n-1}, ... */
+  PetscReal c[max_order]; /* c_1, c_2, ..., factors of the values at t_n, t_{n-1}, ... */
 };
 
-/* Of order k, from tau_1 ... tau_k */
+/* The coefficients of order k, from tau_1 ... tau_k */
 inline BDF BDFOf(PetscInt k, const PetscReal tau[])
 {
   BDF       b   = {};
@@ -47,7 +48,7 @@ inline BDF BDFOf(PetscInt k, const PetscReal tau[])
   return b;
 }
 
-/* What stands in place of HHT's parameters in a step of length h of order k. tau_1 ... tau_{k+1} */
+/* The parameters, in place of HHT's, of a step of length h and order k, from tau_1 ... tau_{k+1} */
 inline Parameters BDFParameters(PetscInt k, PetscReal h, const PetscReal tau[])
 {
   const PetscReal gh = BDFOf(k, tau).gh;
@@ -57,24 +58,25 @@ inline Parameters BDFParameters(PetscInt k, PetscReal h, const PetscReal tau[])
   p.gamma   = p.gamma_s = gh / h;
   p.beta    = p.gamma * p.gamma;
   p.k       = p.beta * gh / tau[k];
-  p.k_s     = 0; /* states are judged as coordinates are */
+  p.k_s     = 0; /* not used: the error of states is that of coordinates, ErrorOfOrder() */
   return p;
 }
 
-/* Scaled differences come from values d_j at times t_0 > t_1 > ... by d_j = (d_j - d_{j+1}) times this for m = 1, 2, ...: then d_0 is the m-th divided difference times tau_1 ... tau_m,
-   tau_j = t_0 - t_j, which is the m-th backward difference where steps are constant */
+/* Scaled differences follow from values d_j at times t_0 > t_1 > ... by d_j = (d_j - d_{j+1}) times this factor, for m = 1, 2, ...:
+   then d_0 is the m-th divided difference times tau_1 ... tau_m, tau_j = t_0 - t_j; with constant steps this is the m-th backward
+   difference */
 inline PetscReal DifferenceFactor(const PetscReal t[], PetscInt m, PetscInt j) { return (t[0] - t[m]) / (t[j] - t[j + m]); }
 
-/* The error of order k is this times the (k+1)-th scaled difference */
+/* The error of a step of order k is this times the (k+1)-th scaled difference */
 inline PetscReal ErrorFactor(PetscInt k, const PetscReal tau[]) { return BDFOf(k, tau).gh / tau[k]; }
 
-/* That of HHT in a step of length h is this times the third one, which is tau_1 tau_2 tau_3 q'''/6 */
+/* The error of HHT in a step of length h is this times the third scaled difference, which is tau_1 tau_2 tau_3 q'''/6 */
 inline PetscReal HHTErrorFactor(const Parameters &p, PetscReal h, const PetscReal tau[])
 {
   return PetscAbsReal(p.k) * 6 * h / tau[0] * h / tau[1] * h / tau[2];
 }
 
-/* Weights of the values at nodes x_0 ... x_k in the polynomial through them, at x; exactly one and zero at the nodes */
+/* Weights of the values at the nodes x_0 ... x_k in the value at x of the polynomial through them; exactly one and zero if x is a node */
 inline void LagrangeWeights(PetscInt k, const PetscReal node[], PetscReal x, PetscReal weight[])
 {
   for (PetscInt j = 0; j <= k; j++) {

@@ -15,7 +15,7 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal even_middle  = 0.1; /* phi changes evenly if its value in the middle is the mean of those at the ends to within this part of their difference */
+constexpr PetscReal even_middle  = 0.1; /* part of the difference between the ends by which phi in the middle may miss their mean */
 constexpr int       max_halvings = 60; /* then the interval is rounding, and the force jumps */
 
 /* The line X(s) = X(0) - s dX */

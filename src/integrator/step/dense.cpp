@@ -3,10 +3,11 @@
 
   Order two: cubic Hermite polynomials for q (from q, q'), for q' (from q', q'') and for states (from s, s'); linear for q'', lambda, V and F.
 
-  Order k above it: the polynomials of degree k through the last k + 1 values of q, of q' and of states, which for q is the one that the step is made of, and of degree k
-  through those that the predictor keeps of q'', s', lambda, V and F, as far as these reach back.
+  Order k above two: for q, q' and states the polynomials of degree k through the last k + 1 values, which for q is the polynomial
+  that defines the step; for q'', s', lambda, V and F those through the values that the predictor keeps, of degree k if there are
+  enough.
 
-  Both ends give back the step's own values.
+  At both ends of the step the result is the step's own values.
 */
 #include "dense.h"
 #include "integrator/entries.h"
@@ -20,7 +21,7 @@ namespace hht3
 namespace
 {
 
-/* The value of a polynomial, as a sum of vectors */
+/* The value of a polynomial, as a weighted sum of vectors */
 struct WeightedSum {
   PetscInt    n = 0;
   PetscScalar weight[max_order + 2];
@@ -41,7 +42,7 @@ struct WeightedSum {
   }
 };
 
-/* Through `end` at t_{n+1} and k values before it */
+/* The polynomial through `end` at t_{n+1} and k values x at times t before it, evaluated at the time `at` */
 WeightedSum Through(const Integrator &I, PetscReal at, Vec end, PetscInt k, const PetscReal t[], const Vec x[])
 {
   PetscReal   node[max_order + 1] = {I.t1}, weight[max_order + 1];
@@ -53,7 +54,7 @@ WeightedSum Through(const Integrator &I, PetscReal at, Vec end, PetscInt k, cons
   return sum;
 }
 
-/* Of U or U' */
+/* The same through the last values of U or U' */
 WeightedSum ThroughStates(const Integrator &I, PetscReal at, Vec end, Vec begin, const Vec past[])
 {
   Vec x[max_order] = {begin};
@@ -62,7 +63,7 @@ WeightedSum ThroughStates(const Integrator &I, PetscReal at, Vec end, Vec begin,
   return Through(I, at, end, I.order.now, I.order.t, x);
 }
 
-/* The second half of the basis of cubic Hermite polynomials on [0, 1], which grows from 0 to 1 */
+/* The cubic Hermite polynomial on [0, 1] that is 0 at 0 and 1 at 1, with slopes of 0 */
 PetscReal HermiteEnd(PetscReal x) { return x * x * (1 + 2 * (1 - x)); }
 
 /* The cubic Hermite polynomial of values and slopes at both ends of the step */
@@ -86,7 +87,7 @@ WeightedSum Linear(PetscReal x, Vec y0, Vec y1)
   return sum;
 }
 
-/* The polynomials by what they are of: q and s, q', q'', s', and what is algebraic */
+/* The polynomials of q and s, of q', q'' and s', and of algebraic unknowns */
 struct Polynomials {
   WeightedSum differential, velocity, acceleration, rate, algebraic;
 };
@@ -100,7 +101,7 @@ Polynomials OfStep(const Integrator &I, PetscReal t)
   return {ThroughStates(I, inside, I.U1, I.U0, I.order.U), ThroughStates(I, inside, I.V1, I.V0, I.order.V), unknowns, unknowns, unknowns};
 }
 
-/* The rotation vectors among U, of order two, after all coordinates */
+/* Corrects the rotation vectors in U, at order two, which have been interpolated as other coordinates are */
 PetscErrorCode AtRotations(Integrator &I, PetscReal x, WeightedSum velocity, Vec U)
 {
   WorkVec V;
@@ -115,11 +116,11 @@ PetscErrorCode AtRotations(Integrator &I, PetscReal x, WeightedSum velocity, Vec
 
 } // namespace
 
-/* Where t lies in the last step: 0 to 1, and these at its ends exactly */
+/* The position of t in the last step, from 0 to 1, exact at the ends */
 PetscReal StepFraction(const Integrator &I, PetscReal t) { return t == I.t1 ? 1 : PetscClipInterval((t - I.t0) / I.h, 0, 1); }
 
-/* Monitors are called when an event has taken the step back, too, and after an error users look for what went before it: then the state is that of t_n, and nothing is known of other times.
-   Functions of events are asked before the first step of a start, too. */
+/* Whether the only known state is that at t_n, and t is t_n: when TSEvent has rolled a step back, after which monitors are called;
+   after an error; and when event functions are evaluated before the first step of a start. */
 bool IsBeginOfStep(TS ts, PetscReal t) { return (Get(ts).event_ahead || (!Get(ts).have_step && Get(ts).at_begin)) && t == ts->ptime; }
 
 /* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */

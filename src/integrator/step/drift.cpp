@@ -1,10 +1,11 @@
 /*
   Velocities when h changes.
 
-  The method satisfies Phi = 0, but Phi_q q' + Phi_t = 0 only up to a drift C h^2. While h is constant, so is this drift of the velocities, and it does
-  no harm. When h changes from h_n to h, the drift has to become C h^2 within one step, which takes accelerations of
-  C (h_n^2 - h^2)/h normal to the constraints: a spike of first order in q'' and lambda. It shows in all that depends on these (outputs, states driven by
-  accelerations), and in the error test of such states as an error that does not decrease with h as it should.
+  The method satisfies Phi = 0, but Phi_q q' + Phi_t = 0 only up to a drift C h^2. While h is constant, so is this drift of the
+  velocities, and it does no harm. When h changes from h_n to h, the drift has to become C h^2 within one step, which takes
+  accelerations of C (h_n^2 - h^2)/h normal to the constraints: a spike of first order in q'' and lambda. It shows in all that depends
+  on these (outputs, states driven by accelerations), and in the error test of such states as an error that does not decrease with h
+  as it should.
 
   So the part 1 - (h/h_n)^2 of the drift is subtracted from q'_n before a step of a new length. The drift dV follows from
   [M^ Phi_q^T; Phi_q 0] [dV; mu] = [0; Phi_q q' + Phi_t], with the present Newton matrix, since it need not be exact, and the right-hand side

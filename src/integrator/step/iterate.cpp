@@ -40,7 +40,7 @@ PetscErrorCode FullStep(SNESLineSearch ls, void *ctx)
   monitors = snes->numbermonitors;
   if (!I.corrector.reason || monitors || I.corrector.user_test) {
     if (!evaluated) PetscCall(SNESComputeFunction(snes, X, F));
-    if (monitors || I.corrector.user_test) PetscCall(VecNorm(F, NORM_2, &fnorm)); /* otherwise not needed: if the residual is not finite, nor is the next correction */
+    if (monitors || I.corrector.user_test) PetscCall(VecNorm(F, NORM_2, &fnorm)); /* else not needed: a residual that is not finite shows in the next correction */
   }
   if (I.corrector.user_test) {
     PetscCall(VecNorm(X, NORM_2, &xnorm));
@@ -243,7 +243,7 @@ PetscErrorCode RunSNES(TS ts, PetscBool *ok)
   if (ts->snes->lagjacobian > 0) c.user_lag = PETSC_TRUE; /* the user has set a lag after the set-up */
   if (!c.user_lag) PetscCall(SNESSetLagJacobian(ts->snes, c.matrix.want ? -2 : -1));
   PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
-  if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_TRUE)); /* rough solves suffice: each correction removes the error of the last one, and the rate is measured */
+  if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_TRUE)); /* each correction removes the error of the last one, and the rate is measured */
   ts->snes->jacobiandomainerror = PETSC_FALSE; /* PETSc 3.18 never clears it: one singular matrix would fail all later solves */
   const PetscErrorCode failed = SNESSolve(ts->snes, NULL, I.X);
   if (I.linear.refines) PetscCall(LinearSolveRoughly(P, PETSC_FALSE));

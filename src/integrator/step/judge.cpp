@@ -10,15 +10,17 @@
   limit under error control, but not below a hundredth of the tolerance while h_limit holds; without limit, and fifty times more
   strictly, at fixed steps.
 
-  Corrections that no longer decrease are accepted if rounding makes corrections of their size. This is measured at the iterate (rounding.cpp) and
-  holds for this iteration alone: in a position where Phi_q nearly loses rank, rounding is far above that of later steps, whose errors would otherwise grow with it.
+  Corrections that no longer decrease are accepted if rounding makes corrections of their size. This is measured at the iterate
+  (rounding.cpp) and holds for this iteration alone: in a position where Phi_q nearly loses rank, rounding is far above that of later
+  steps, whose errors would otherwise grow with it.
 
   With constraints and little damping c is smaller, ConstrainedTolerance(): the error left in q excites the
   multipliers' oscillation. At alpha = -0.01, c = 1e-3 was enough for this oscillation to fail the error test, which no reduction of h cures
   (h fell to 1e-6). A c that the user has set is used as it is.
 
-  The iteration goes on after a small correction if the residual has not followed it (verify.cpp), if the next correction would be too large, or if forces
-  of driven coordinates are not balanced (driven.cpp); and, where it would fail, if corrections alternate in direction (bisection.cpp).
+  The iteration goes on after a small correction if the residual has not followed it (verify.cpp), if the next correction would be too
+  large, or if forces of driven coordinates are not balanced (driven.cpp); and, where it would fail, if corrections alternate in
+  direction (bisection.cpp).
 */
 #include "corrector.h"
 #include "estimate.h"

@@ -1,17 +1,19 @@
 /*
   The error of steps above order two, and the choice of the order.
 
-  Both come from the scaled differences S_m = tau_1 ... tau_m |q[t_{n+1}, ..., t_{n+1-m}]|, by the weights of the error test: order m has the
-  error E_m = gamma_m h/tau_{m+1} S_{m+1}, HHT the one of (26) with q''' from the third difference. That order is taken with which the next step may be
-  longest, 1/E_m^{1/(m+1)}, among the one at hand and its neighbours.
+  Both are computed from the scaled differences S_m = tau_1 ... tau_m |q[t_{n+1}, ..., t_{n+1-m}]| in the norm of the error test:
+  order m has the error E_m = gamma_m h/tau_{m+1} S_{m+1}, HHT that of (26) with q''' from the third difference. Of the present order
+  and its neighbours, the one that allows the longest next step, proportional to E_m^{-1/(m+1)}, is chosen.
 
-  In place of S_m stands an amplitude, which falls from step to step by no more than a fifth: where q^(m) passes zero S_m tells nothing of the next step.
+  Instead of S_m an amplitude is used, which decreases by at most a fifth per step: where q^(m) passes through zero, S_m says nothing
+  about the next step.
 
-  The same differences tell how stable an order is. On the imaginary axis order 3 grows by 0.2 % a step at h omega = 0.3 and by 1.1 % at 0.5, order 4 by 0.02 % and
-  0.5 %, order 5 not at all below 0.7 but by 13 % at 1 (roots of their characteristic polynomials; A(86), A(73), A(51)-stable). An oscillation that hardly
-  anything damps grows there, however small it is, until the error test sees it, and a fast spin gains energy. It shows in S_{m+1}/S_m = 2 sin(h omega/2), long before it has the size of the tolerance,
-  since high differences magnify it. So this ratio limits the step of orders 3 to 5, and HHT, which has no such limit and takes the oscillation away, is chosen where its
-  step is longer. Orders 3 and 4, whose limits are lower, are mostly ways to 5.
+  The same differences show whether an order is stable. On the imaginary axis order 3 grows by 0.2 % a step at h omega = 0.3 and by
+  1.1 % at 0.5, order 4 by 0.02 % and 0.5 %, order 5 not at all below 0.7 but by 13 % at 1 (roots of their characteristic polynomials;
+  A(86), A(73), A(51)-stable). There an oscillation with hardly any damping grows, however small it is, until it shows in the error
+  test, and a fast spin gains energy. The ratio S_{m+1}/S_m = 2 sin(h omega/2) shows it long before it has the size of the tolerance,
+  since high differences magnify it. So this ratio limits the step of orders 3 to 5. HHT, which has no such limit and damps the
+  oscillation, is chosen if its step is longer. Orders 3 and 4, whose limits are lower, are mostly intermediate to order 5.
 */
 #include "order.h"
 #include "predictor.h"
@@ -24,22 +26,23 @@ namespace hht3
 namespace
 {
 
-/* S_{m+1}/S_m up to which orders 3, 4, 5 are taken for stable: h omega = 0.4, 0.5, 0.65 */
+/* Largest S_{m+1}/S_m for which orders 3, 4, 5 count as stable: h omega = 0.4, 0.5, 0.65 */
 constexpr PetscReal stable_ratio[max_order + 1] = {0, 0, 0, 0.4, 0.49, 0.64};
 
-/* From step to step that ratio counts as no more than so many times as much, from this value up: sharp places that are soon over are no oscillation */
+/* The ratio that is used grows by at most this factor per step once it exceeds least_ratio: a short sharp change of the motion is no
+   oscillation */
 constexpr PetscReal ratio_growth = 1.15, least_ratio = 0.1;
 
-/* Of an amplitude in the course of a step of constant length */
+/* Smallest factor on an amplitude per step of constant length */
 constexpr PetscReal amplitude_decay = 0.8;
 
-/* Differences below this part of the tolerance tell of rounding and of what the corrector leaves */
+/* Differences below this, in units of the tolerance, are dominated by rounding and by the error that the corrector leaves */
 constexpr PetscReal least_difference = 0.5;
 
-/* Of h from one step to the next above order two: coefficients of variable steps grow with it */
+/* Largest growth of h from one step to the next above order two: the coefficients of variable steps grow with it */
 constexpr PetscReal max_growth = 2;
 
-/* S_m of U1, U0 and the past as far as that goes; those beyond are -1 */
+/* S_m of U1, U0 and the past, as far as it reaches; -1 for higher m */
 PetscErrorCode DifferencesOfStates(TS ts, NormType type, PetscReal S[])
 {
   Integrator &I   = Get(ts);
@@ -48,7 +51,7 @@ PetscErrorCode DifferencesOfStates(TS ts, NormType type, PetscReal S[])
   PetscReal   t[max_order + 2] = {I.t1};
 
   PetscFunctionBegin;
-  if (!o.measured || type != o.norm) { /* by the estimate */
+  if (!o.measured || type != o.norm) { /* the error estimate has usually measured them */
     std::copy_n(o.t, max_order + 1, t + 1);
     std::fill_n(o.S, max_order + 2, -1);
     PetscCall(ScaledDifferences(ts, type, o.past + 2, x, t, o.S));
@@ -59,11 +62,11 @@ PetscErrorCode DifferencesOfStates(TS ts, NormType type, PetscReal S[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of the accepted step, and the candidates for the next one */
+/* Amplitudes, errors and ratios after the accepted step, by order: what the choice of the next order is made of */
 struct Candidates {
-  PetscReal S[max_order + 3]; /* -1: not known */
-  PetscReal E[max_order + 2]; /* likewise */
-  PetscReal ratio[max_order + 1]; /* of S_{m+1} to S_m, for as long as it lasts; 0 where stability is no matter */
+  PetscReal S[max_order + 3]; /* amplitude of S_m; -1: not known */
+  PetscReal E[max_order + 2]; /* error E_m; -1: not known */
+  PetscReal ratio[max_order + 1]; /* S_{m+1}/S_m with its growth limited; 0: stability does not limit the step */
 };
 
 PetscErrorCode FindCandidates(TS ts, Candidates *c)
@@ -94,19 +97,21 @@ PetscErrorCode FindCandidates(TS ts, Candidates *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What stability leaves of the present h for order m */
+/* Longest step, as a multiple of the present h, for which order m is stable */
 PetscReal StableReach(const Candidates &c, PetscInt m) { return m > 2 && c.ratio[m] > 0 ? stable_ratio[m] / c.ratio[m] : PETSC_MAX_REAL; }
 
-/* What is left of it by the m steps in which no body may turn farther than a rotation vector tells, with some room for spins that grow */
+/* Longest step, as a multiple of the present h, for which no body turns by more than longest_turn in the m steps of the history, less
+   10 % for spins that grow */
 PetscReal TurnReach(const Integrator &I, PetscInt m) { return m > 2 && I.order.spin > 0 ? 0.9 * longest_turn / (m * I.order.spin * I.h) : PETSC_MAX_REAL; }
 
-/* How much longer the next step of order m may be, with `safety` for its error */
+/* Longest next step of order m, as a multiple of the present h, with the factor `safety` on the step that its error allows */
 PetscReal StepRatio(const Integrator &I, const Candidates &c, PetscInt m, PetscReal safety)
 {
   return PetscMin(c.E[m] > 0 ? safety * PetscPowReal(c.E[m], (PetscReal)-1 / (m + 1)) : PETSC_MAX_REAL, PetscMin(StableReach(c, m), TurnReach(I, m)));
 }
 
-/* Better: at fixed steps the one with the smaller error that is stable, else the one with the larger step */
+/* Whether order m is better than order `than`: with fixed steps if it alone is stable, or if it has the smaller error; otherwise if
+   its step is longer */
 bool IsBetterOrder(const Integrator &I, const Candidates &c, PetscInt m, PetscInt than)
 {
   if (c.E[m] < 0 || c.E[than] < 0) return false;
@@ -115,7 +120,8 @@ bool IsBetterOrder(const Integrator &I, const Candidates &c, PetscInt m, PetscIn
   return m_stable == than_stable ? c.E[m] < c.E[than] : m_stable;
 }
 
-/* The order for the step after the accepted one, -ts_hhtdae_order auto. The present one is left after as many steps as its history has, or for HHT at once. */
+/* The order for the step after the accepted one, with -ts_hhtdae_order auto. Order k is used for k steps at least before it is
+   changed; to order two it may change at once. */
 PetscInt BestOrder(const Integrator &I, const Candidates &c)
 {
   const Order   &o     = I.order;
@@ -123,18 +129,18 @@ PetscInt BestOrder(const Integrator &I, const Candidates &c)
   const bool     known = k < o.max && c.E[k + 1] >= 0 && o.past >= k;
 
   if (k == 2) return known && o.wait == 0 && IsBetterOrder(I, c, 3, 2) ? 3 : 2;
-  if (o.above > k && IsBetterOrder(I, c, 2, k)) return 2; /* differences over steps of order two have kinks where h changes */
+  if (o.above > k && IsBetterOrder(I, c, 2, k)) return 2; /* not while the history has steps of order two, whose differences have kinks where h changes */
   if (o.since < k) return k;
   if (k > 3 && IsBetterOrder(I, c, k - 1, k)) return k - 1;
   return known && IsBetterOrder(I, c, k + 1, k) ? k + 1 : k;
 }
 
-/* A fixed order is reached from two as soon as the history is there */
+/* The next order on the way from two to a fixed order, which rises as soon as the history allows it */
 PetscInt NextToFixed(const Order &o) { return o.now < o.max && o.wait == 0 && o.past >= o.now + 1 ? o.now + 1 : o.now; }
 
 } // namespace
 
-/* Of the attempt: its local error in units of the tolerance */
+/* The local error of an attempt of order above two, in units of the tolerance */
 PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte)
 {
   Integrator    &I = Get(ts);
@@ -148,8 +154,9 @@ PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For the step after the accepted one, whose estimate is known. *next: the length that the controller has chosen for the present order, and that of the next
-   one on return; NULL if another one than ours chooses it. */
+/* Chooses the order of the step after the accepted one, whose error estimate is known. *next: on entry the step size that the
+   controller has chosen for the present order, on return the one for the chosen order; NULL if a TSAdapt other than "hhtdae" chooses
+   it. */
 PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
 {
   Integrator &I = Get(ts);

@@ -2,8 +2,9 @@
   The predictor, section 6 of the paper: a, s', lambda, V, F at t_{n+1} extrapolated by the polynomial of degree 0 to 3 (up to 5 above order two) through their
   values at the ends of the accepted steps.
 
-  The polynomial of degree d through the values before it missed a new one by its scaled difference of order d + 1, so that one sweep tells
-  which degree would have served best. That degree is used next; a higher one must be better by a margin, since it amplifies noise.
+  The polynomial of degree d through the values before a new one misses it by the scaled difference of order d + 1. So one sweep shows
+  which degree would have been the best one for the last step; it is used for the next. A higher degree must be better by a margin,
+  since it amplifies noise.
 */
 #include "integrator/entries.h"
 #include "predictor.h"
@@ -16,9 +17,9 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal higher_degree_margin = 0.7; /* a higher degree must have missed by less than this times the lower one's miss */
+constexpr PetscReal higher_degree_margin = 0.7; /* a higher degree is taken if its error was less than this times that of the lower one */
 
-/* Predicted s' at t1 to the algorithmic w that gives it: the average of states in PrepareStage(), solved for w */
+/* Replaces the predicted s' at t1 by the algorithmic w that gives it: the average of states in PrepareStage(), solved for w */
 PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
 {
   const Parameters &p = I.p;
@@ -31,7 +32,8 @@ PetscErrorCode StatesToUnknowns(const Integrator &I, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The squares of scaled differences by the weights, or the largest. Room for more points than there are costs zero factors, and saves loops with inner branches. */
+/* The sums of squares of weighted scaled differences, or the largest ones. `room` is a constant so that loops are unrolled; points
+   that are missing have factors of zero. */
 template <int room, bool largest>
 struct DifferenceSweep {
   const PetscScalar *x[room], *w;
@@ -98,7 +100,7 @@ PetscErrorCode SlopeOfUnknowns(const Integrator &I, Vec slope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forgets the history; X[0] stands as the only point */
+/* Forgets the history; X[0] is left as the only point */
 PetscErrorCode PredictorReset(TS ts)
 {
   Predictor &p = Get(ts).predictor;
@@ -126,8 +128,9 @@ PetscErrorCode Predict(TS ts, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Positions stay: the unknowns of coordinates for which the step ends where it begins, all others as predicted. A static state is near where a load
-   that comes at once meets what is far stiffer than inertia, and where the ends of such a load ring from step to step. */
+/* Sets the unknowns of coordinates so that U1 = U0; all others stay as predicted. Where a load sets in suddenly on a system whose
+   stiffness in a step far exceeds its inertia, the solution is near the static one; the prediction is far off there, and also after
+   it, while such a load makes accelerations oscillate from step to step. */
 PetscErrorCode PredictRest(const Integrator &I, Vec X)
 {
   const PetscReal k = ScalePosition(I.p, I.h);
@@ -142,7 +145,7 @@ PetscErrorCode PredictorUpdate(TS ts)
 {
   Integrator    &I = Get(ts);
   Predictor     &p = I.predictor;
-  /* the estimate of states needs the value before t_n, dense output of order k those of k ends */
+  /* the error estimate of states needs the value before t_n, dense output of order k those at the ends of k steps */
   const PetscInt keep = PetscMax(p.degree_max, I.order.max > 2 ? I.order.max - 1 : I.count[TSHHT3_STATE] ? 1 : 0);
   const PetscInt have = PetscMin(p.available, keep) + 1;
   PetscReal      S[max_degree + 2], best = PETSC_MAX_REAL;
