@@ -1,12 +1,13 @@
 /*
-  Coordinates that the constraints alone move: parts whose motion is given.
+  Driven coordinates: those of parts whose motion is given, which are determined by the constraints alone.
 
-  The corrector is judged by corrections of the positions. Those of driven coordinates are over with the first one and say nothing of the
-  forces that drive them, which an old matrix gets wrong by what its directions have turned since. So where there are any, what the residual
-  has left in their rows is judged as if they were free: by the change of position that it would make in this step.
+  The corrector is judged by corrections of the positions. Driven coordinates are right after the first correction, which says nothing about the
+  forces that drive them. With an old matrix these forces are wrong, as the directions of the constraints have turned since. So the residual
+  in the rows of driven coordinates is judged as if they were free: by the change of position that it would make in this step.
 
-  To see that takes a residual more, unless the one before the last correction was as good, as where directions do not turn: the vehicle of the
-  examples, whose wheels stand on posts that go up and down, takes 22 of them in 4,000 steps, in place of 2,834.
+  This takes one more evaluation of the residual, unless the residual before the last correction was small enough, as it is where
+  directions do not turn. The vehicle of the examples, whose wheels stand on posts that go up and down, takes 22 such evaluations in
+  4,000 steps, in place of 2,834.
 */
 #include "integrator/step/corrector.h"
 #include "integrator/entries.h"
@@ -21,10 +22,12 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal least_tolerance = 1e-4; /* of the corrector's: at fixed steps the error of the last step takes the tolerance's place, down to here, as forces have rounding (StiffStart.StrongDampingStopsAtOnce) */
-constexpr PetscReal driven_response = 1e-9; /* of what inertia alone would answer to a force: less is rounding of the solve */
+/* The tolerance of these forces is at least this part of CorrectorTolerance(): at fixed steps that of the iteration falls with the
+   error of the last step, but forces have rounding (StiffStart.StrongDampingStopsAtOnce) */
+constexpr PetscReal least_tolerance = 1e-4;
+constexpr PetscReal driven_response = 1e-9; /* an acceleration below this part of force/inertia is rounding of the solve: driven */
 
-/* The residual in the rows of driven coordinates, in units of the tolerance, above what is known of its rounding */
+/* The residual in the rows of driven coordinates, less its rounding as far as measured, in units of the tolerance */
 PetscErrorCode InDriven(TS ts, Vec F, PetscReal *left)
 {
   PetscReal sum[4];
@@ -36,7 +39,8 @@ PetscErrorCode InDriven(TS ts, Vec F, PetscReal *left)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A body that turns about any axis is not driven about those that happen to be across it */
+/* A rotation vector counts as driven only if all its components do not move: a body that turns about one axis is not driven about the
+   two others */
 PetscErrorCode WholeRotations(const Integrator &I, Vec unmoved)
 {
   PetscScalar *x;
@@ -48,7 +52,8 @@ PetscErrorCode WholeRotations(const Integrator &I, Vec unmoved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* 1 for coordinates that do not answer a force of random signs in all rows of motion, by the factored matrix at hand, 0 for the other unknowns */
+/* unmoved: 1 for coordinates that do not accelerate under a force of random signs in all equations of motion, by the present factored
+   matrix; 0 for other unknowns */
 PetscErrorCode FindUnmoved(TS ts, Vec unmoved)
 {
   Integrator   &I = Get(ts);
@@ -79,7 +84,7 @@ PetscErrorCode CountDriven(const Integrator &I, PetscInt *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which coordinates may be driven, by the factored matrix of the start */
+/* Finds the coordinates that may be driven, by the factored matrix of the start */
 PetscErrorCode NoteDriven(TS ts)
 {
   Integrator &I = Get(ts);
@@ -96,8 +101,8 @@ PetscErrorCode NoteDriven(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before a correction is judged. F: the residual that it answers, unless `evaluated` after it. A new matrix tells which coordinates are free after all: a pendulum that hung
-   straight down at the start, Driven.FreeAfterAll. */
+/* Called before a correction is judged. F: the residual before the correction, or after it if `evaluated`. A new matrix shows which
+   coordinates are not driven after all, such as those of a pendulum that hung straight down at the start (Driven.FreeAfterAll). */
 PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated)
 {
   Integrator      &I = Get(ts);
@@ -108,7 +113,7 @@ PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated)
   PetscFunctionBegin;
   if (!I.verify.driven) PetscFunctionReturn(PETSC_SUCCESS);
   if (c.matrix.fresh && c.it - c.base == 1) {
-    PetscCall(unmoved.like(F)); /* a user may have zeros taken for a first guess */
+    PetscCall(unmoved.like(F)); /* zeros, as the user may have set KSPSetInitialGuessNonzero() */
     PetscCall(FindUnmoved(ts, unmoved));
     PetscCall(VecPointwiseMult(I.verify.driven, I.verify.driven, unmoved));
     PetscCall(CountDriven(I, &all));
@@ -118,8 +123,8 @@ PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a correction that would be the last: whether forces of driven coordinates are as good as accelerations of free ones, at `tolerance`.
-   F holds the residual at X if `evaluated`, which it then is. */
+/* Called after a correction that would be the last one: whether forces of driven coordinates are as accurate as accelerations of free
+   ones, by `tolerance`. F: the residual at X if `evaluated`; it is evaluated here if needed. */
 PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBool *evaluated, PetscBool *good)
 {
   Integrator     &I      = Get(ts);

@@ -1,5 +1,5 @@
-/* Whether a small correction proves that the equations hold (stiffness.cpp, verify.cpp), also for forces of parts whose motion is given (driven.cpp), and whether
-   the application's Jacobian is to blame if it does not (wrong_jacobian.cpp). */
+/* Whether a small correction proves that the equations hold (stiffness.cpp, verify.cpp), also those of parts whose motion is given
+   (driven.cpp); and if not, whether the application's Jacobian is wrong (wrong_jacobian.cpp). */
 #ifndef HHTDAE_PROOFS_H
 #define HHTDAE_PROOFS_H
 
@@ -8,7 +8,8 @@
 namespace hht3
 {
 
-/* From the matrix of the start, and from every new matrix P of a step, made at X */
+/* NoteInertia(): called with the matrix P of a start. NoteDriven(): called when it is factored, as it solves with it. NoteStiffness():
+   called with every new matrix P of a step, made at X. */
 PetscErrorCode NoteInertia(TS ts, Mat P);
 PetscErrorCode NoteDriven(TS ts);
 PetscErrorCode NoteStiffness(TS ts, Vec X, Mat P);
@@ -16,21 +17,24 @@ PetscErrorCode NoteStiffness(TS ts, Vec X, Mat P);
 /* Rounding of each entry of the residual F at X */
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise);
 
-/* Before a correction is judged. F: the residual that it answers, unless `evaluated` after it */
+/* Called before a correction is judged. F: the residual before the correction, or after it if `evaluated` */
 PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated);
 
-/* After the correction dX, which has led to X and would be the last: whether the residual has followed it, and whether forces of driven coordinates are
-   as good as accelerations of free ones. F: the residual at X if `evaluated`, which it then is. */
+/* Called after the correction dX, which has led to X and would be the last one. VerifyCorrection(): whether the residual has followed
+   it. ForcesOfDriven(): whether the forces of driven coordinates are as accurate as the accelerations of free ones. F: the residual
+   at X if `evaluated`; they evaluate it if they need it. */
 PetscErrorCode VerifyCorrection(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved);
 PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBool *evaluated, PetscBool *good);
 
-/* After a correction that has failed with a matrix of its own: sets wrong_jacobian if the residual has not answered it at all */
+/* Called after an iteration that has failed with a matrix of its own: sets corrector.wrong_jacobian if the residual does not respond
+   to the last correction at all */
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated);
 
-/* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
+/* Whether corrections may be small although the residual is not: the matrix has large claims, or there are definitions, whose
+   stiffness does not show in its diagonal */
 bool MayHideForces(const Integrator &I);
 
-/* How many coordinates may be driven */
+/* The number of coordinates that may be driven, on all ranks */
 PetscErrorCode CountDriven(const Integrator &I, PetscInt *all);
 
 } // namespace hht3

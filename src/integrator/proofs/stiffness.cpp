@@ -1,4 +1,5 @@
-/* How much stiffer than inertia the Newton matrix says that each unknown is (claim_i of verify.cpp), and what is measured where that raises a doubt */
+/* The stiffness relative to inertia that the Newton matrix claims for each unknown (claim_i of verify.cpp); measurement of inertia
+   and of rounding of the residual where these claims are doubtful */
 #include "integrator/entries.h"
 #include "integrator/equations/equations.h"
 #include "proofs.h"
@@ -13,16 +14,19 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal stiffness_to_prove = 10;  /* below it a correction is too small by no more than this, and the next steps take up what is left; inertia that varies with the position claims as much */
-constexpr PetscReal negligible_inertia = 1e-14; /* inertia below this part of the mean is rounding */
-constexpr PetscReal rounding_of_sums   = 4 * PETSC_MACHINE_EPSILON; /* of some terms in a residual, relative to the largest */
+/* Claims below this need no proof: a correction is too small by at most this factor, and the following steps correct the rest.
+   Inertia that varies with the position claims as much. */
+constexpr PetscReal stiffness_to_prove = 10;
+constexpr PetscReal negligible_inertia = 1e-14; /* inertia below this part of the (geometric) mean is rounding */
+constexpr PetscReal rounding_of_sums   = 4 * PETSC_MACHINE_EPSILON; /* of a sum of a few terms, relative to the largest */
 
 } // namespace
 
-/* Whether the matrix may hide an imbalance: by its diagonal, or by definitions, whose stiffness does not stand there */
+/* Whether corrections may be small although the residual is not: the matrix has large claims, or there are definitions, whose
+   stiffness does not show in its diagonal */
 bool MayHideForces(const Integrator &I) { return I.verify.largest >= stiffness_to_prove || (I.verify.largest > 0 && HasDefinitions(I)); }
 
-/* claim_i of the matrix P with the inertia at hand, and the largest */
+/* Computes claim_i of the matrix P with the present inertia, and the largest one */
 static PetscErrorCode MeasureStiffness(TS ts, Mat P)
 {
   Integrator   &I = Get(ts);
@@ -41,8 +45,8 @@ static PetscErrorCode MeasureStiffness(TS ts, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the matrix P of the start. inertia_i: M_ii of coordinates, dF/ds' of states; 0 for a coordinate without mass, but for rounding, and
-   for all others: of these nothing is asked */
+/* Takes inertia_i from the matrix P of a start: M_ii of coordinates, dF/ds' of states. It is 0 for coordinates without mass (up to
+   rounding) and for all other unknowns, whose rows are not verified. */
 PetscErrorCode NoteInertia(TS ts, Mat P)
 {
   Integrator   &I = Get(ts);
@@ -69,7 +73,7 @@ PetscErrorCode NoteInertia(TS ts, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To be called for every new matrix P of a step, made at X */
+/* Called for every new matrix P of a step, made at X */
 PetscErrorCode NoteStiffness(TS ts, Vec X, Mat P)
 {
   Integrator   &I = Get(ts);
@@ -89,9 +93,10 @@ PetscErrorCode NoteStiffness(TS ts, Vec X, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |F(x + dx) - F| for the residual F at X and dx of pseudo-random signs and sizes: rounding of all that the residual is made of, the unknowns, and
-   positions, states and velocities as sums of terms; of one unknown with one factor, lest they cancel. (By changes of X alone, rounding of
-   positions would be one of velocities too, far above theirs where h is small: what stands still in a steep brake would have no force.) */
+/* noise = |F(x + dx) - F|, where F is the residual at X and dx are pseudo-random rounding errors of all that the residual depends on:
+   the unknowns, and positions, states and velocities as sums of terms. All quantities of one unknown have the same random factor, so
+   that they do not cancel. (If X alone were changed, rounding of positions would change velocities, too, by far more than their
+   rounding if h is small: for a body at rest in a steep brake all of the force would count as rounding.) */
 static PetscErrorCode SampleRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
 {
   Integrator &I = Get(ts);
@@ -121,8 +126,8 @@ static PetscErrorCode SampleRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* noise = the larger of it and of another sample: in one of them the unknowns of a stiff spring may move with each other, which leaves its force as it is
-   (Stiff.FastModeBesideASlowOne) */
+/* noise = maximum of noise and another sample: in a single sample the unknowns at both ends of a stiff spring may have the same
+   change, which does not change its force (Stiff.FastModeBesideASlowOne) */
 PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
 {
   WorkVec other;
@@ -134,7 +139,7 @@ PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rounding of the residual F at X, by two samples */
+/* Rounding of each entry of the residual F at X, by two samples */
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
 {
   PetscFunctionBegin;
@@ -143,8 +148,8 @@ PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Inertia of coordinates: |F(q''+z) - F(q'')|/|z|, where that stands out of rounding and z does not happen to cancel: 1/weight with random signs, accelerations of the
-   size that the tolerances mean, zero where there is no coordinate */
+/* Measures the inertia of coordinates as |F(q''+z) - F(q'')|/|z|, for rows in which the difference exceeds rounding. z_i is
+   1/weight_i with a random sign, so that columns do not cancel; for unknowns that are no coordinates it is zero. */
 static PetscErrorCode MeasureInertia(TS ts)
 {
   Integrator &I = Get(ts);
@@ -169,8 +174,8 @@ static PetscErrorCode MeasureInertia(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces have rounding, and inertia that varies with the position looks like stiffness to a matrix of the start. Where a doubt has been
-   raised, both are measured at the state of the stage, inertia once for each matrix. */
+/* Called where a proof has failed at first: measures rounding of the residual at X and, once for each matrix, inertia. Inertia that
+   varies with the position looks like stiffness as long as that of the start is used. */
 PetscErrorCode MeasureRowsAtStage(TS ts, Vec X, Vec F)
 {
   Verification &v = Get(ts).verify;

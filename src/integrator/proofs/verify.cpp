@@ -1,21 +1,22 @@
 /*
-  Whether a small correction proves anything.
+  Whether a small correction proves that the residual is small.
 
-  The corrector stops when corrections are small. Where the Newton matrix claims far more stiffness than there is, because it
+  The corrector stops when corrections are small. But if the Newton matrix contains far more stiffness than there is, because it
   is old and what held the system has let go, or because the application's Jacobian is wrong, corrections are small whatever
-  the residual, a rate of earlier steps knows nothing of it, and neither does the error test. So the claim itself is measured:
+  the residual. Neither a rate of earlier steps nor the error test shows this. So the stiffness that the matrix claims is measured:
 
-    claim_i = P_ii / (ca M_ii)        how much stiffer than inertia the matrix says that unknown i is
-    E       = |k| h^2 |claim dX|      what the correction would have been, were there only inertia
+    claim_i = P_ii / (ca M_ii)        stiffness of unknown i in the matrix, relative to inertia
+    E       = |k| h^2 |claim dX|      size of the correction if there were only inertia
 
-  Where the matrix claims nothing, E is the correction and nothing is to be done. Else accelerations of up to A = E/(|k| h^2) may be
-  missing since the last proof, a time T ago, and with them positions of A T^2/2. Before this exceeds a part of the tolerance, the
-  residual is evaluated once more after the last correction. It must have followed: what is left of every entry is below
-  `unanswered_fraction` times what it was (P dX, the linear model that the correction has solved), or rounding, which is then measured (stiffness.cpp),
-  or too little to move the positions: within this step, and since its own last proof where an entry has stayed as it was. A few of many
-  entries look so by chance, other ones each time: so T is a row's own.
+  If the matrix claims no stiffness, E is the size of the correction, and small corrections are a proof. Otherwise accelerations of up
+  to A = E/(|k| h^2) may have been wrong since the last proof, a time T ago, and positions by A T^2/2. Before this exceeds a part of
+  the tolerance, the residual is evaluated once more after the last correction. It must have followed the correction: each of its
+  entries must be below `unanswered_fraction` times its former value (P dX, the linear model that the correction has solved), or be
+  rounding, which is then measured (stiffness.cpp), or be too small to change the positions: within this step or, for an entry that
+  has stayed as it was, since its own last proof. Of many entries a few stay as they were by chance, others each time: so each row has
+  a T of its own.
 
-  Otherwise the iteration goes on; the rate that it then measures, or a new matrix, settles the matter.
+  If the residual has not followed, the iteration goes on. The rate that is then measured, or a new matrix, decides.
 */
 #include "integrator/entries.h"
 #include "integrator/equations/equations.h"
@@ -29,14 +30,15 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal allowed_unproved      = 0.1; /* unproved change of positions, in units of the tolerance */
-constexpr PetscReal explained_by_rounding = 0.9; /* of an imbalance that a sample of rounding has explained in part */
+constexpr PetscReal allowed_unproved      = 0.1; /* largest change of positions without proof, in units of the tolerance */
+constexpr PetscReal explained_by_rounding = 0.9; /* further samples of rounding are taken while each reduces the imbalance below this part of it */
 
-/* Largest change of the positions, in units of the tolerance, by accelerations that would have made a correction of E = |k| h^2 a, over one step */
+/* Largest change of positions, in units of the tolerance, that accelerations A make within a step; E = |k| h^2 A */
 PetscReal PositionChange(const Integrator &I, PetscReal E) { return E / (2 * PetscAbsReal(I.p.k)); }
 
-/* The same by accelerations that the correction dX may have missed in each row since it was proved. Definitions hide stiffness from the
-   diagonal: then what inertia alone would make of the model counts */
+/* *drift: largest change of positions by accelerations that the small correction dX may hide, in each row since it was last proved.
+   With definitions (variables, force states) the diagonal of the matrix does not show stiffness: then the whole model P dX is taken
+   in place of P_ii dX_i */
 PetscErrorCode StiffnessClaimed(TS ts, Vec dX, PetscReal *drift)
 {
   Integrator &I = Get(ts);
@@ -52,9 +54,9 @@ PetscErrorCode StiffnessClaimed(TS ts, Vec dX, PetscReal *drift)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A row of the residual after a correction, as a correction that inertia alone would make */
+/* An entry of the residual after a correction, and before it, as the size of the correction that it would make if there were only inertia */
 struct Row {
-  PetscReal is, was, excess; /* excess: of what may be left of it */
+  PetscReal is, was, excess; /* excess: by how much it is larger than it may be */
 
   Row(const RowScale &s, bool known, PetscReal f, PetscReal model, PetscReal force)
     : is(f * s.answer), was(model * s.answer), excess(PetscMax(0, PetscAbsReal(is) - unanswered_fraction * (PetscAbsReal(was) + (known ? PetscAbsReal(force) * s.answer : 0)) - s.rounding))
@@ -63,10 +65,10 @@ struct Row {
   bool stays() const { return excess > 0 && PetscAbsReal(is - was) < 0.5 * PetscAbsReal(was); }
 };
 
-/* The iteration has been seen to converge: what is left of constraint forces is a part of what they were */
+/* The iteration has been seen to converge: then a part unanswered_fraction of the constraint forces of the correction may be left, too */
 bool RateIsKnown(const Integrator &I) { return I.corrector.matrix.rate >= 0; }
 
-/* R: the residual F, with definitions what they make of it in the equations of motion, which then stands in `passed` */
+/* R: the residual F or, with definitions, `passed`, in which they are substituted into the equations of motion */
 PetscErrorCode ResidualOfMotion(TS ts, Vec F, WorkVec &passed, Vec *R)
 {
   PetscFunctionBegin;
@@ -79,7 +81,7 @@ PetscErrorCode ResidualOfMotion(TS ts, Vec F, WorkVec &passed, Vec *R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All rows are proved now, but for those whose residual F has stayed as it was */
+/* Notes that all rows are proved now, except those whose residual F has stayed as it was */
 PetscErrorCode NoteProof(TS ts, Vec F)
 {
   Integrator     &I     = Get(ts);
@@ -104,7 +106,7 @@ PetscErrorCode NoteProof(TS ts, Vec F)
 
 } // namespace
 
-/* Imbalances of variables and force states act on the equations of motion: R -= P R_B for B = V, F */
+/* Substitutes the residual of definitions (B = V, F), which acts on the equations of motion: R -= P R_B */
 PetscErrorCode SubstituteDefinitions(TS ts, Vec R)
 {
   Integrator &I = Get(ts);
@@ -122,8 +124,8 @@ PetscErrorCode SubstituteDefinitions(TS ts, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the correction was to take away of the residual, by the linear model that it has solved, but for what the constraint forces of
-   its multipliers answer: model = P dX - P_lambda dLambda. Those stand in work. */
+/* The residual that the correction was to remove, by the linear model that it has solved, without the part that forces of constraints remove:
+   model = P dX - P_lambda dlambda. P_lambda dlambda is in `work`. */
 PetscErrorCode ModelResidual(TS ts, Vec dX)
 {
   Integrator   &I = Get(ts);
@@ -147,7 +149,7 @@ PetscErrorCode ModelResidual(TS ts, Vec dX)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is left in F after the correction that has the model at hand */
+/* Compares the residual F after a correction with the model of the correction */
 PetscErrorCode CompareWithModel(TS ts, Vec F, Imbalance *left)
 {
   Integrator &I     = Get(ts);
@@ -164,7 +166,7 @@ PetscErrorCode CompareWithModel(TS ts, Vec F, Imbalance *left)
       const Row row(s, known, f, model, force);
       local[0] += PetscSqr(row.excess);
       if (row.stays()) local[3] += PetscSqr(row.excess * PetscSqr(s.steps));
-      if (PetscAbsReal(row.was) <= s.rounding) return; /* less cannot be told from rounding, even by what persists */
+      if (PetscAbsReal(row.was) <= s.rounding) return; /* a smaller one cannot be told from rounding, even if it persists */
       local[1] += row.is * row.was;
       local[2] += row.was * row.was;
     },
@@ -175,8 +177,8 @@ PetscErrorCode CompareWithModel(TS ts, Vec F, Imbalance *left)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same with inertia and rounding measured at X, until no more than `enough` is left. Of many rows some are rounding that two samples do not show
-   (Stiff.FastModesOfManyPairs): new ones are taken until one has taken next to nothing away. */
+/* The same with inertia and rounding measured at X. Of many rows some have rounding that two samples do not show
+   (Stiff.FastModesOfManyPairs): further samples are taken until at most `enough` is left, or a sample has removed next to nothing. */
 PetscErrorCode CompareAboveRounding(TS ts, Vec X, Vec F, PetscReal enough, Imbalance *left)
 {
   Verification &v = Get(ts).verify;
@@ -192,7 +194,8 @@ PetscErrorCode CompareAboveRounding(TS ts, Vec X, Vec F, PetscReal enough, Imbal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After the correction dX, which has led to X and would be the last. F: the residual at X if `evaluated`, which it then is. */
+/* Called after the correction dX, which has led to X and would be the last one. F: the residual at X if `evaluated`; it is evaluated
+   here if needed. */
 PetscErrorCode VerifyCorrection(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved)
 {
   Integrator   &I = Get(ts);
@@ -216,7 +219,7 @@ PetscErrorCode VerifyCorrection(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluate
   for (int attempt = 0; attempt < 2; attempt++) {
     if (attempt) PetscCall(CompareAboveRounding(ts, X, F, allowed_unproved, &left));
     else PetscCall(CompareWithModel(ts, F, &left));
-    /* a rate measured in this correction speaks for what is left, unless that is as it was */
+    /* A good rate measured in this iteration is a proof, too, unless the residual has stayed as it was */
     const bool good = c.it - c.base >= 2 && c.matrix.rate >= 0 && c.matrix.rate < 0.5 && left.part < 0.5;
     *proved         = (PetscBool)((good || left.all <= allowed_unproved) && left.stay <= allowed_unproved);
     if (attempt && !*proved) {

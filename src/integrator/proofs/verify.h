@@ -1,4 +1,5 @@
-/* What the sources of this folder share: what is known of rows (stiffness.cpp), and the comparison of the residual with what a correction has promised. */
+/* Shared by the sources of this folder: scales of rows (from stiffness.cpp), and the comparison of the residual with the linear model
+   of a correction. */
 #ifndef HHTDAE_VERIFY_H
 #define HHTDAE_VERIFY_H
 
@@ -8,20 +9,26 @@
 namespace hht3
 {
 
-constexpr PetscReal unanswered_fraction = 0.1; /* of what a residual was: at 0.3 friction that slips within a step passed for followed */
+/* A residual has followed a correction if it is below this part of its former size. At 0.3 this held for friction that starts to slip
+   within a step. */
+constexpr PetscReal unanswered_fraction = 0.1;
 
-/* d s'/d w, which a row of a state has in place of ca */
+/* d s'/d w: the factor of inertia for first-order states, as ca() is for coordinates */
 inline PetscReal StateInertia(const Parameters &p) { return p.gamma_s * p.gamma / p.beta; }
 
 inline bool HasDefinitions(const Integrator &I) { return I.count[TSHHT3_VARIABLE] || I.count[TSHHT3_FORCE]; }
 
-/* Of a row, in units of the tolerance: a residual that inertia alone answers, the same of a residual over its inertia, and rounding; and how
-   many times h has gone since the row was proved */
+/* The scales of a row, in units of the tolerance:
+     answer     size of the correction that a residual of 1 would make if there were only inertia
+     claimed    the same for a residual that has been divided by its inertia (times ca() or StateInertia())
+     rounding   size of the correction that rounding of the residual would make if there were only inertia
+   and steps, the time since the row was last proved, this step included, as a multiple of h */
 struct RowScale {
   PetscReal answer, claimed, rounding, steps;
 };
 
-/* Of row i with inertia m > 0, weight w of its unknown, rounding of its residual and the time for which it has not been proved */
+/* The scales of row i, which has the inertia m > 0, the weight w of its unknown, rounding `noise` of its residual, and the time
+   `unproved` of Verification */
 class RowScales {
 public:
   explicit RowScales(const Integrator &I) : I(I), claimed{PetscAbsReal(I.p.k) * I.h * I.h, I.p.gamma_s * I.h}, answer{claimed[0] / I.p.ca(), claimed[1] / StateInertia(I.p)} {}
@@ -34,10 +41,10 @@ public:
 
 private:
   const Integrator &I;
-  const PetscReal   claimed[2], answer[2]; /* of coordinates, of states */
+  const PetscReal   claimed[2], answer[2]; /* of coordinates, and of states */
 };
 
-/* The sums that entry(scale, sum, x...) adds to, over all rows of which something is asked and all ranks; x: entries of further vectors */
+/* Calls entry(scale, sum, x...), which adds to the four sums, for all rows with inertia on all ranks; x: entries of further vectors */
 template <class Entry, class... More>
 PetscErrorCode SumRows(TS ts, PetscReal sum[4], Entry entry, More... more)
 {
@@ -56,11 +63,11 @@ PetscErrorCode SumRows(TS ts, PetscReal sum[4], Entry entry, More... more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a correction has left of the residual that it was to take away, as changes of positions in units of the tolerance */
+/* The residual that a correction was to remove and has not, as the change of positions that it makes, in units of the tolerance */
 struct Imbalance {
-  PetscReal all  = 0; /* within this step */
-  PetscReal stay = 0; /* of entries that are about as they were, since they were proved */
-  PetscReal part = 0; /* of the residual that is as it was */
+  PetscReal all  = 0; /* of all rows, within this step */
+  PetscReal stay = 0; /* of rows whose residual has stayed about as it was, over the time since they were proved */
+  PetscReal part = 0; /* part of the former residual that is still there: (new, old)/(old, old) */
 };
 
 /* stiffness.cpp */

@@ -1,4 +1,5 @@
-/* Is it the model that the residual does not follow a correction, or is the application's Jacobian wrong? See verify.cpp */
+/* If the residual does not follow a correction (verify.cpp): whether the application's Jacobian is wrong, or the model has for
+   instance a contact that ends */
 #include "integrator/entries.h"
 #include "proofs.h"
 #include "verify.h"
@@ -10,15 +11,15 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal probe_fraction = 0.25; /* of the correction, to either side: near enough for a model without corners there, and far out of rounding */
-constexpr PetscReal above_rounding = 10;   /* times rounding: changes that a row shows */
-constexpr PetscReal least_answer   = 0.1;  /* part of a correction that the residual answers: below it the iteration does not converge in ten */
+constexpr PetscReal probe_fraction = 0.25; /* part of the correction by which probes go to either side: near, to avoid corners of the model, but well above rounding */
+constexpr PetscReal above_rounding = 10;   /* a row is used if its expected change exceeds this times its rounding */
+constexpr PetscReal least_answer   = 0.1;  /* ratio of actual to expected change below which the Jacobian is wrong: ten corrections would not suffice */
 
 bool HasFollowed(const RowScale &s, PetscReal now, PetscReal was) { return PetscAbsReal(now) * s.answer <= unanswered_fraction * PetscAbsReal(was) * s.answer + s.rounding; }
 
-/* How much of the change that the matrix expects on a part `way` of dX, from where the matrix was made, the residual shows: 1 if the Jacobian
-   is right there. In the rows that have not followed dX, as far as they stand out of rounding; the constraint `forces` of dX are taken as the
-   matrix has them. -1: there are no such rows. */
+/* *answer: ratio of the actual change of the residual to the one that the matrix predicts, from the X at which the matrix was made to
+   X - way dX; 1 if the Jacobian is right there. Only rows count that have not followed dX and exceed rounding; the constraint
+   `forces` of dX are taken from the matrix. -1: there are no such rows. */
 PetscErrorCode MeasureAnswer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forces, PetscReal *answer)
 {
   Verification &v = Get(ts).verify;
@@ -48,8 +49,9 @@ PetscErrorCode MeasureAnswer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, V
 
 } // namespace
 
-/* The residual at X does not follow the correction dX, made with a matrix of this very step: is that a property of the model, such as a
-   contact that ends on the way, or is the Jacobian wrong where it was evaluated? There one of the two directions along dX must answer. */
+/* The residual F at X has not followed the correction dX, made with a matrix of this very iteration. That may be a property of the
+   model, such as a contact that ends on the way. *wrong: the Jacobian is wrong where it was evaluated, as the residual there responds
+   in neither direction along dX. */
 PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
 {
   Verification &v = Get(ts).verify;
@@ -67,7 +69,8 @@ PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a correction that has failed with a matrix of its own: whether the residual has not answered it at all */
+/* Called after an iteration that has failed with a matrix of its own: sets corrector.wrong_jacobian if the residual does not respond
+   to the last correction at all */
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 {
   Integrator &I = Get(ts);
