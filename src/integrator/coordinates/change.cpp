@@ -1,18 +1,18 @@
 /*
-  New generalized coordinates in the course of a run, such as Euler angles of another reference frame before theta = 0:
-  a pointwise, nonlinear map of q, and with it of q', q'', the history and the matrix. The motion does not change, and
-  so the run goes on without a restart and with the same degree of the predictor.
+  New generalized coordinates in the course of a run, such as Euler angles about another reference frame before theta reaches 0:
+  a pointwise, nonlinear map of q, and with it of q', q'', the history and the matrix. The motion does not change, so that
+  the run goes on without a restart and with the same degree of the predictor.
 
-  It happens at the beginning of a step, after the last one has become the history: from then on everything is in the
-  new coordinates, and neither a rejection nor a roll-back leads to the old ones. What is mapped and how stands in
-  history.cpp, what the constraints make of it in drift.cpp. Of the rest:
+  The change takes place at the beginning of a step, after the last one has become history. From then on everything is in the
+  new coordinates; neither a rejection nor a roll-back returns to the old ones. history.cpp describes what is mapped and how,
+  drift.cpp what the constraints require. As to the rest:
 
-  weights   Y_i, the largest |q_i| so far, goes on: max(Y_i, |new q_i|). Started anew from |new q_i| it would fall at once to what an angle
-            happens to be in the new frame, and the tolerance rtol Y_i with it: the same motion at the same h would fail the test that it has
-            just passed. Kept, an entry's tolerance can only grow, as everywhere.
-  h         shortened where the prediction tells that the error test would fail in the new coordinates
-  matrix    made anew before the next correction, from the prediction, with no more factorizations than one per change
-  F0        of the paper's form: evaluated anew, after commit
+  weights   Y_i becomes max(Y_i, |new q_i|), so that an entry's tolerance can only grow, as everywhere. With |new q_i| alone it could fall at
+            once to what an angle happens to be in the new frame, and the tolerance rtol Y_i with it: the same motion at the same h would fail the
+            test that it has just passed.
+  h         is shortened if, by the prediction, the error test would fail in the new coordinates
+  matrix    is made before the next correction, from the prediction; one factorization per change
+  F0        of the paper's form is evaluated after commit
   dV        of drift.cpp belongs to a step, and is measured in the new coordinates if h changes
 */
 #include "change.h"
@@ -28,8 +28,8 @@ namespace hht3
 namespace
 {
 
-/* A predicted error of the first step in new coordinates above the tolerance calls for a shorter one: the least part of h that is left, above
-   what RestartConsistently() takes for a fall */
+/* If the predicted error of the first step in new coordinates exceeds the tolerance, h is shortened, but at most to this part: below
+   restart_ratio, NeedsRestart() would ask for a restart */
 constexpr PetscReal least_cut = 0.2;
 
 PetscErrorCode WantsChange(TS ts, PetscBool *wanted)
@@ -46,7 +46,7 @@ PetscErrorCode WantsChange(TS ts, PetscBool *wanted)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* vec_sol, vec_dot and the application follow U0, V0 */
+/* Copies the mapped U0, V0 into vec_sol, vec_dot, and tells the application that the change is done */
 PetscErrorCode PublishState(TS ts)
 {
   Integrator &I = Get(ts);
@@ -74,7 +74,7 @@ PetscErrorCode CommitChange(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At t_n, if the application wants to: before a consistent start, or before a step that goes on from U0, V0 */
+/* Changes the coordinates at t_n if the application asks for it: before a consistent start, or before a step from U0, V0 */
 PetscErrorCode ChangeCoordinates(TS ts, bool starting)
 {
   Integrator &I = Get(ts);
@@ -101,9 +101,9 @@ PetscErrorCode ChangeCoordinates(TS ts, bool starting)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The error test in the new coordinates, asked before the step with the prediction in place of the solution. The same
-   motion has another third derivative there: h that was right may be too long by a quarter, and it would take a
-   rejection to find out. */
+/* Applies the error test in the new coordinates before the step, to the prediction in place of the solution. The same
+   motion has another third derivative there, so that the old h may be too long by a quarter: this avoids a rejected
+   step. */
 PetscErrorCode StepAfterChange(TS ts)
 {
   Integrator &I = Get(ts);
@@ -132,8 +132,8 @@ PetscErrorCode StepAfterChange(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The matrix that the first iteration of the next correction would make, made beforehand: drift.cpp needs it, and a
-   user's -snes_lag_jacobian would go on with the one of the old coordinates */
+/* Makes beforehand the matrix that the first corrector iteration of the next step would make: drift.cpp needs it, and with a
+   user's -snes_lag_jacobian the matrix of the old coordinates would be used again */
 PetscErrorCode MatrixAfterChange(TS ts)
 {
   Integrator &I = Get(ts);

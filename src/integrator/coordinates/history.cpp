@@ -1,17 +1,17 @@
 /*
-  New coordinates for the state and for the history.
+  Maps state and history to new coordinates.
 
-  The application's map takes (q, q', q'') at one time from the old to the new coordinates. The predictor keeps
-  accelerations alone, and algorithmic ones: a_{n-k} is q'' at x_k = t_{n-k} + lag h_{n-k}, in other words at a time at
-  which neither q nor q' is stored. So the motion is drawn through what there is: q'' as the polynomial through the
+  The application's map takes (q, q', q'') at one time from the old to the new coordinates. But the predictor keeps only
+  algorithmic accelerations: a_{n-k} is q'' at x_k = t_{n-k} + lag h_{n-k}, a time at
+  which neither q nor q' is stored. So the motion is reconstructed: q'' as the polynomial through the
   a_{n-k} at x_k, q' and q as its integrals from the state at t_n. The integrals are as smooth in time as the
   polynomial, and so are the mapped accelerations: they predict as well as the old ones did.
-  (Newmark's formulas backwards would give the stored q, q', but with the jumps that changes of h leave in them, which
+  (Newmark's formulas backwards in time would give the stored q and q', but with the jumps that changes of h leave in them, which
   divided differences magnify.)
 
   All of this is linear in the stored vectors, so that it takes a few scalar weights per time and one sweep.
 
-  Entries that the map leaves alone keep their bits.
+  Entries that the map does not change stay as they are, bit for bit.
 */
 #include "change.h"
 #include "integrator/entries.h"
@@ -28,13 +28,13 @@ namespace
 
 constexpr PetscInt max_basis = max_degree + 1;
 
-/* The motion about t_n in old coordinates, by stored vectors */
+/* The motion about t_n in old coordinates: q'' as the polynomial through stored vectors */
 struct Motion {
-  PetscInt  nodes = 0;            /* of the predictor */
-  PetscInt  n     = 0;            /* stored vectors in use */
-  Vec       stored[max_basis];    /* of the predictor, or its only one and A0 */
-  PetscReal x[max_basis];         /* their times, from t_n */
-  PetscReal unit = 1;
+  PetscInt  nodes = 0;            /* number of values of the predictor */
+  PetscInt  n     = 0;            /* number of stored vectors in use */
+  Vec       stored[max_basis];    /* those of the predictor; if it has only one, A0 is the second */
+  PetscReal x[max_basis];         /* their times, relative to t_n */
+  PetscReal unit = 1;             /* unit of time in the powers of the polynomial */
 };
 
 Motion Recall(const Integrator &I)
@@ -45,13 +45,14 @@ Motion Recall(const Integrator &I)
   m.nodes = m.n = p.available + 1;
   m.unit        = I.h_last > 0 ? I.h_last : 1;
   for (PetscInt k = 0; k < m.nodes; k++) {
-    /* the step that ended at t_{n-k}; of the last node it is not known, nor of the one before where that tells the slope of a start */
+    /* Length of the step that ended at t_{n-k}. It is not known for the last node, nor for the one before if the last one gives the
+       slope of a start. */
     const PetscReal h = k > 0 && k < m.nodes - 1 ? p.t[k] - p.t[k + 1] : 0;
     if (k > 0 && h > 20 * slope_fraction * (p.t[k - 1] - p.t[k])) lag = I.p.lag() * h;
     m.x[k]      = p.t[k] - p.t[0] + lag;
     m.stored[k] = p.X[k];
   }
-  if (m.nodes == 1 && m.x[0] != 0) { /* a history of one: q'' at t_n tells the slope */
+  if (m.nodes == 1 && m.x[0] != 0) { /* a history of one value: with q'' at t_n it gives a slope */
     m.n         = 2;
     m.x[1]      = 0;
     m.stored[1] = I.A0;
@@ -59,7 +60,7 @@ Motion Recall(const Integrator &I)
   return m;
 }
 
-/* Weights of the stored vectors in q''(x), and in its first and second integral from 0 to x */
+/* Weights w[0], w[1], w[2] of the stored vectors in q''(x) and in its first and second integral from 0 to x */
 PetscErrorCode MotionWeights(const Motion &m, PetscReal x, PetscReal w[3][max_basis])
 {
   PetscReal       L[max_basis][max_basis] = {}, power = 1;
@@ -74,12 +75,12 @@ PetscErrorCode MotionWeights(const Motion &m, PetscReal x, PetscReal w[3][max_ba
     for (PetscInt k = 0; k < m.n; k++) L[k][j] = PetscPowRealInt(m.x[k] / u, j);
   }
   PetscCall(PetscBLASIntCast(m.n, &n));
-  PetscCallBLAS("LAPACKgesv", LAPACKgesv_(&n, &sides, &L[0][0], &stride, pivots, &w[0][0], &stride, &failed)); /* of L^T, as it reads columns */
+  PetscCallBLAS("LAPACKgesv", LAPACKgesv_(&n, &sides, &L[0][0], &stride, pivots, &w[0][0], &stride, &failed)); /* with L^T: LAPACK stores by columns */
   PetscCheck(!failed, PETSC_COMM_SELF, PETSC_ERR_LIB, "The polynomial through the last steps cannot be evaluated: LAPACK's gesv returns %d", (int)failed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the map is given, what came of it, and which entries it has changed in any triple */
+/* Argument and result of the map, and which entries it has changed in any of the triples so far: Triple, any of q, q', q''; Acceleration, q'' */
 struct Mapping {
   enum : unsigned char { Triple = 1, Acceleration = 2 };
   WorkVec                    old[3], now[3];
@@ -100,7 +101,7 @@ struct Mapping {
   }
 };
 
-/* From old to now at t_n + x */
+/* Applies the map at t_n + x: from `old` to `now` */
 PetscErrorCode MapAt(TS ts, Mapping &map, PetscReal x)
 {
   Integrator &I = Get(ts);
@@ -115,7 +116,7 @@ PetscErrorCode MapAt(TS ts, Mapping &map, PetscReal x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The motion at t_n + x; what is not a coordinate as at t_n, without accelerations */
+/* The motion at t_n + x. Unknowns that are no coordinates have their values at t_n, and no accelerations. */
 PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, const WorkVec (&to)[3])
 {
   PetscReal w[3][max_basis];
@@ -139,7 +140,7 @@ PetscErrorCode At(const Integrator &I, const Motion &m, PetscReal x, const WorkV
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* New values of q'' at the nodes */
+/* Maps q'' at the nodes */
 PetscErrorCode MapNodes(TS ts, const Motion &m, Mapping &map, const WorkVec value[])
 {
   PetscFunctionBegin;
@@ -151,8 +152,8 @@ PetscErrorCode MapNodes(TS ts, const Motion &m, Mapping &map, const WorkVec valu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* d of drift.cpp: the third derivative in new coordinates less the old one taken along as a tangent. The map is affine
-   in q'', and its difference for two q'' is that tangent. */
+/* Computes d of drift.cpp: the third derivative in new coordinates less the old one mapped as a tangent. The map is affine
+   in q'', so that its difference for two values of q'' maps a tangent. */
 PetscErrorCode MapJerk(TS ts, const Motion &m, Mapping &map)
 {
   Integrator     &I = Get(ts);
@@ -182,7 +183,7 @@ PetscErrorCode MapJerk(TS ts, const Motion &m, Mapping &map)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The state, from old to now */
+/* Maps the state at t_n */
 PetscErrorCode MapState(TS ts, Mapping &map)
 {
   Integrator &I = Get(ts);
@@ -195,7 +196,7 @@ PetscErrorCode MapState(TS ts, Mapping &map)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Multipliers and the like have no second derivative to map, and states are no coordinates */
+/* The map may change coordinates only: other unknowns have no second derivative */
 PetscErrorCode CheckRoles(TS ts, const Mapping &map)
 {
   Integrator &I = Get(ts);
@@ -210,7 +211,8 @@ PetscErrorCode CheckRoles(TS ts, const Mapping &map)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes over what has changed: the values at the nodes, and the state; in the paper's form q''_n is a_n but for a start */
+/* Copies changed entries into the predictor and into the state. In the paper's form q''_n and a_n are the same, except after a start,
+   and stay so. */
 PetscErrorCode TakeOver(Integrator &I, const Motion &m, const Mapping &map, const WorkVec value[])
 {
   PetscFunctionBegin;
@@ -231,7 +233,7 @@ PetscErrorCode TakeOver(Integrator &I, const Motion &m, const Mapping &map, cons
 
 } // namespace
 
-/* U0 and V0 before a consistent start: there is no history, and accelerations are still to come */
+/* Maps U0 and V0 before a consistent start: there is no history, and accelerations are not known yet */
 PetscErrorCode MapStart(TS ts)
 {
   Integrator &I = Get(ts);
@@ -247,7 +249,7 @@ PetscErrorCode MapStart(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U0, V0, A0, X0, the predictor's values, and what drift.cpp needs to know */
+/* Maps U0, V0, A0, X0 and the predictor's values, and computes d for drift.cpp */
 PetscErrorCode MapHistory(TS ts)
 {
   Integrator  &I = Get(ts);

@@ -1,6 +1,6 @@
 /*
-  Rotation vectors x, attitudes exp([x]) relative to a reference, as unit quaternions where they are composed, and the tangent T of the exponential map,
-  d exp([x]) = [T(x) dx] exp([x]) in axes of space:
+  Rotation vectors x, which are attitudes exp([x]) relative to a reference; their composition, by unit quaternions; and the tangent T
+  of the exponential map, d exp([x]) = [T(x) dx] exp([x]) in axes of space:
 
     T(x) = 1 + S_2 [x] + S_3 [x]^2,    S_2 = (1 - cos a)/a^2,  S_3 = (a - sin a)/a^3,  a = |x|
 */
@@ -22,7 +22,7 @@ inline PetscReal Dot(const PetscScalar *a, const PetscScalar *b) { return PetscR
 
 inline PetscReal VectorLength(const PetscScalar *a) { return PetscSqrtReal(Dot(a, a)); }
 
-/* Scalar and vector of the unit quaternion of exp([x]) */
+/* Scalar and vector part of the unit quaternion of exp([x]) */
 struct Turn {
   PetscReal   scalar;
   PetscScalar vector[3];
@@ -35,7 +35,7 @@ struct Turn {
   }
 };
 
-/* The vector of exp([x]) q^{-1}, at most half a turn */
+/* The rotation vector of exp([x]) q^{-1}, at most half a turn */
 inline void RelativeRotation(const PetscScalar *x, const Turn &q, PetscScalar *result)
 {
   const Turn        p(x);
@@ -86,7 +86,7 @@ inline void Solve3(const PetscScalar A[3][3], const PetscScalar *b, PetscScalar 
 
      d(T(x) b)/dx = -S_2 [b] + S_3 ((x.b) 1 + x b^T - 2 b x^T) + ((2 S_4 - S_3) x x b + (3 S_5 - S_4) x x (x x b)) x^T,   S_m = sum (-z)^k/(2k + m)!,  z = x.x
 
-   It ends when the last change leaves nothing above rounding, or where it does not converge, which a rotation of about a turn brings about. */
+   It ends when the last change was so small that its square is rounding, or after 20 iterations: near a full turn it does not converge. */
 inline void ImplicitRotation(const PetscScalar *base, const PetscScalar *g, PetscScalar *x)
 {
   constexpr int       most = 20;

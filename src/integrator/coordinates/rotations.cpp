@@ -1,22 +1,25 @@
 /*
-  Coordinates that are local rotation vectors: a body's rotation from its attitude at the last accepted state, its angular velocity w in axes
-  of space, and w'. There U' = V and U'' = A hold where U = 0 alone.
+  Coordinates that are local rotation vectors: U is a body's rotation from its attitude at the last accepted state, V its angular
+  velocity w in axes of space, A = w'. So U' = V and U'' = A hold only at U = 0.
 
-  Newmark's relations (2a) then are those of the generalized-alpha method on the rotation group (Bruels, Cardona, Arnold 2012) but for
-  the axis that turns in the step: of Magnus' series for U, the integral of w and the commutator of w with itself, they know the first term.
-  The second one is 1/12 h^2 w_{n+1} x w_n in a step. Without it a fast top is off by 10 times as much, and reactions begin with an error of first
-  order (Arnold, Bruels, Cardona, Numer. Math. 129, 2015). It takes w_{n+1} of the iterate: with -h^3/12 w_n x w'_n in its place what is stiff
-  across the axis of spin grows at small damping. Where the application leaves it out of its matrix, corrections of what is stiff across that axis
-  converge at the rate gamma/(12 beta) h |w|, 0.16 h |w|.
+  With these coordinates Newmark's relation (2a) is that of the generalized-alpha method on the rotation group (Bruels, Cardona,
+  Arnold 2012), if the axis of rotation is fixed during the step: of Magnus' series for U, the integral of w and then commutators of w
+  at different times, it contains the first term. The second one, 1/12 h^2 w_{n+1} x w_n in a step, is added here. Without it the
+  error of a fast top is 10 times as large, and reactions begin with an error of first order (Arnold, Bruels, Cardona, Numer. Math.
+  129, 2015). It uses w_{n+1} of the iterate: with -h^3/12 w_n x w'_n instead, motions against stiff forces across the axis of spin
+  grow at small damping. If the application omits the term in its matrix, corrections of stiff forces across that axis converge at the
+  rate gamma/(12 beta) h |w|, 0.16 h |w|.
 
-  Above order two (bdf.cpp) no series is needed. About the attitude at t_n, the rotation vectors U of the attitudes before and after it are a smooth function of time with
-  U' = T(U)^{-1} w, to which backward differentiation applies as to any other: w is differentiated as every velocity is, and
+  Above order two (bdf.cpp) no series is needed. About the attitude at t_n, the rotation vectors U of the attitudes before and after
+  it are a smooth function of time with U' = T(U)^{-1} w, to which backward differentiation applies as to any coordinate: w is
+  differentiated as every velocity is, and
 
     U_{n+1} = Sum_j c_j U_{n+1-j} + gamma h T(U_{n+1})^{-1} w_{n+1},   U_n = 0
 
-  With every new reference the past vectors are re-expressed by composing rotations. The order is that of backward differentiation at any spin for which the history is
-  within half a turn of the reference. (About a reference that turns on with w_n, where no such limit is, a precessing top of prescribed w was off by 10 to 100 times
-  as much.) A rotation vector depends on w by gamma h (1 - (h - gamma h)/2 [w] + O(h^2)).
+  With every new reference the past vectors are re-expressed by composing rotations. The order is that of backward differentiation at
+  any spin for which the history is within half a turn of the reference. (With a reference that goes on rotating with w_n there is no
+  such limit, but the error of a precessing top of prescribed w was 10 to 100 times as large.) The derivative of a rotation vector
+  with respect to w is gamma h (1 - (h - gamma h)/2 [w] + O(h^2)).
 */
 #include "integrator/entries.h"
 #include "integrator/step/order.h"
@@ -31,7 +34,7 @@ namespace hht3
 namespace
 {
 
-/* of a step of length h */
+/* The second term of Magnus' series in a step of length h */
 void Commutator(PetscReal h, const PetscScalar *w0, const PetscScalar *w1, PetscScalar *c) { Cross(h * h / 12, w1, w0, c); }
 
 } // namespace
@@ -59,7 +62,8 @@ PetscErrorCode SetUpRotations(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rotation vectors in U1, V1 being that of the stage: at order two what (2a) has left there and the commutator, above it from their base */
+/* Computes the rotation vectors in U1; V1 has to be that of the stage already. At order two the commutator is added to U1 of (2a);
+   above, U1 follows from its base. */
 PetscErrorCode StageOfRotations(const Integrator &I)
 {
   PetscFunctionBegin;
@@ -84,8 +88,8 @@ PetscErrorCode StageOfRotations(const Integrator &I)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A rotation vector u at the fraction x of the step, where w is v: from a polynomial whose slopes are w at both ends, but which took `part` of the
-   commutator in U1 along */
+/* Corrects a rotation vector u that was interpolated at the fraction x of the step, where the angular velocity is v: the polynomial
+   has the slopes w at both ends, and contains `part` of the commutator in U1 */
 void InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u)
 {
   PetscScalar whole[3], now[3];
@@ -94,15 +98,16 @@ void InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, con
   for (int k = 0; k < 3; k++) u[k] += now[k] - part * whole[k];
 }
 
-/* What TSHHT3GetRotationFactor() tells, of the step at hand */
+/* The factor of TSHHT3GetRotationFactor() in the present step */
 PetscReal RotationFactor(const Integrator &I)
 {
   const PetscReal gh = EffectiveStep(I);
   return I.order.now > 2 ? 0.5 * gh * (I.h - gh) : I.h * I.h / 12;
 }
 
-/* Where the axis turns and angular accelerations stay, as those of a ball that rolls along a curve, (26) finds no error. That of the series is its next term,
-   h^2 |w|^2/60 of the second one. Added to the sum of squares, or to the largest, on this rank. */
+/* Where the axis of rotation turns but angular accelerations are constant, as those of a ball that rolls along a curve, (26) finds no
+   error. The error of the series is its next term, h^2 |w|^2/60 times the second one. It is added to *result, a sum of squares, or
+   the maximum with it is taken, on this rank. */
 PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *result)
 {
   PetscFunctionBegin;
@@ -123,13 +128,13 @@ PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Past attitudes about that of U0: exp([x]) A = exp([x]) exp([-u]) exp([u]) A. Those that a body has left by so much that a rotation vector tells no longer by how much are
-   forgotten, and how fast bodies turn is noted for the choice of the next step. */
+/* Expresses past attitudes relative to that of U0: exp([x]) A = exp([x]) exp([-u]) exp([u]) A. Past states with a body more than
+   longest_turn away are dropped. Notes the fastest rotation for the choice of the next step. */
 static PetscErrorCode ReferPast(TS ts)
 {
   Integrator        &I    = Get(ts);
   Order             &o    = I.order;
-  PetscReal          most[2] = {(PetscReal)-o.past, 0}, all[2]; /* - states that are kept, the largest rotation of the step */
+  PetscReal          most[2] = {(PetscReal)-o.past, 0}, all[2]; /* minus the number of states that are kept, and the largest rotation in the step */
   const PetscScalar *u;
   PetscScalar       *x[max_order];
 
@@ -154,7 +159,7 @@ static PetscErrorCode ReferPast(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U0 becomes the reference, and vec_sol follows */
+/* Makes the attitudes of U0 the reference, and copies U0 to vec_sol */
 PetscErrorCode ReferToState(TS ts)
 {
   Integrator &I = Get(ts);
@@ -168,7 +173,8 @@ PetscErrorCode ReferToState(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U is the reference until ReferBack() gives it back its entries. Constraints are differentiated there. */
+/* Makes the attitudes of U the reference until ReferBack(), which restores the entries of U from `before`. Used where constraints are
+   differentiated at U. */
 PetscErrorCode ReferTo(TS ts, Vec U, WorkVec &before)
 {
   Integrator &I = Get(ts);

@@ -1,4 +1,4 @@
-/* Local rotation vectors, rotations.cpp: their reference, their stages, and their part of the error and of the dense output. */
+/* Local rotation vectors, rotations.cpp: their reference, their stage, and their part of the error estimate and of the dense output. */
 #ifndef HHTDAE_ROTATIONS_H
 #define HHTDAE_ROTATIONS_H
 
@@ -8,30 +8,32 @@
 namespace hht3
 {
 
-/* Of a body from a past attitude to that of the reference, rad: a rotation vector knows no more than half a turn */
+/* Largest rotation of a body from a past attitude to the reference, rad: a rotation vector describes at most half a turn */
 constexpr PetscReal longest_turn = 3;
 
 PetscErrorCode SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferBack back, void *ctx);
 PetscErrorCode SetUpRotations(TS ts);
 
-/* U0 becomes the reference, and vec_sol follows */
+/* Makes the attitudes of U0 the reference, and copies U0 to vec_sol */
 PetscErrorCode ReferToState(TS ts);
 
-/* U is the reference until ReferBack() gives it back its entries */
+/* Makes the attitudes of U the reference until ReferBack(), which restores the entries of U from `before` */
 PetscErrorCode ReferTo(TS ts, Vec U, WorkVec &before);
 PetscErrorCode ReferBack(TS ts, Vec U, const WorkVec &before);
 
-/* Rotation vectors of U1, V1 being that of the stage */
+/* Computes the rotation vectors in U1; V1 has to be that of the stage already */
 PetscErrorCode StageOfRotations(const Integrator &I);
 
-/* What TSHHT3GetRotationFactor() tells: of the step at hand, and to the application while the matrix of a step is made */
+/* The factor of TSHHT3GetRotationFactor() in the present step; GetRotationFactor() returns it to the application while the matrix of
+   a step is made, else 0 */
 PetscReal      RotationFactor(const Integrator &I);
 PetscErrorCode GetRotationFactor(TS ts, PetscReal *factor, Vec *begin);
 
-/* Their part of the error estimate of order two on this rank: added to a sum of squares, or the larger one */
+/* Their part of the error estimate of order two on this rank: added to *result, a sum of squares, or the maximum with it */
 PetscErrorCode AddRotationErrors(const Integrator &I, NormType type, PetscReal *result);
 
-/* A rotation vector u at the fraction x of the step, where w is v, from a polynomial that took `part` of the commutator in U1 along */
+/* Corrects a rotation vector u that was interpolated at the fraction x of the step, where the angular velocity is v; the polynomial
+   contains `part` of the commutator in U1 */
 void InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u);
 
 } // namespace hht3
