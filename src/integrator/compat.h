@@ -34,24 +34,24 @@ typedef PetscOptionItems HHT3OptionItems;
   #define HHT3_INT_MAX PETSC_INT_MAX
 #endif
 
-/* Of max_snes_failures: any negative number before */
+/* The value of max_snes_failures that means no limit: before 3.22 any negative number */
 #if PETSC_VERSION_LT(3, 22, 0)
   #define HHT3_UNLIMITED (-1)
 #else
   #define HHT3_UNLIMITED PETSC_UNLIMITED
 #endif
 
-/* MatFDColoringSetFunction() took a function of no particular type */
+/* The type of function that MatFDColoringSetFunction() takes: before 3.24 a pointer to functions of any kind */
 #if PETSC_VERSION_LT(3, 24, 0)
 typedef PetscErrorCode (*HHT3ColoringFunction)(void);
 #else
 typedef MatFDColoringFn *HHT3ColoringFunction;
 #endif
 
-/* An error unless the PETSc that runs is one that this library was built for; version.cpp */
+/* An error unless the PETSc that is loaded is one for which this library was built; version.cpp */
 PetscErrorCode HHT3CheckPetscVersion(void);
 
-/* The first point after t that a step has to end at with TS_EXACTFINALTIME_MATCHSTEP: of a time span, or the final time */
+/* The first time after t at which a step has to end with TS_EXACTFINALTIME_MATCHSTEP: a point of a time span, or the final time */
 static inline PetscReal HHT3StopAfter(TS ts, PetscReal t)
 {
   const PetscReal  least = t + 16 * PETSC_MACHINE_EPSILON * PetscAbsReal(t);
@@ -66,8 +66,9 @@ static inline PetscReal HHT3StopAfter(TS ts, PetscReal t)
   return k < n ? point[k] : ts->max_time;
 }
 
-/* Points of a time span that a run has behind it where it begins or is resumed, so that TSAdaptChoose() does not aim at them. Their solutions are not known to it: not a number
-   (Checkpoint.ResumesInATimeSpan, BetweenRuns.BeginInATimeSpan) */
+/* Marks the points of a time span that lie before the time at which a run begins or is resumed as passed, so that TSAdaptChoose()
+   does not aim at them. Solutions at these points are not known and set to NAN (Checkpoint.ResumesInATimeSpan,
+   BetweenRuns.BeginInATimeSpan). *passed: there are such points. */
 static inline PetscErrorCode HHT3PassStops(TS ts, PetscBool *passed)
 {
   PetscFunctionBegin;
@@ -87,8 +88,8 @@ static inline PetscErrorCode HHT3PassStops(TS ts, PetscBool *passed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Since 3.21 TSRollBack() restores the solution from a copy made at the beginning of the step: it has to follow a change of
-   coordinates of vec_sol within the step */
+/* Since 3.21 TSRollBack() restores the solution from a copy made at the beginning of the step. If the coordinates of vec_sol change within the
+   step, so must the copy. */
 static inline PetscErrorCode HHT3KeepForRollBack(TS ts)
 {
   PetscFunctionBegin;
@@ -110,8 +111,8 @@ static inline PetscBool HHT3EventActive(TS ts)
 #endif
 }
 
-/* Whether the step to come is the first one behind an event. Where it ends at the final time TSEvent takes that for the place of any zero within it: it looks for it with a step of what is
-   left until then, which is nothing */
+/* Whether the next step is the first one after an event. It must not end at the final time: TSEvent would look for a zero within it
+   with a step of the time left until then, which is zero. */
 static inline PetscBool HHT3BehindEvent(TS ts)
 {
 #if PETSC_VERSION_LT(3, 21, 0)
@@ -132,8 +133,9 @@ static inline bool HHT3IsLocated(TS ts, PetscInt event)
   return std::find(r.eventidx[k], r.eventidx[k] + r.nevents[k], event) != r.eventidx[k] + r.nevents[k];
 }
 
-/* Behind an event a zero that was located counts as one, if the function is still what it was there: within a long step TSEvent ends its search by the length of the interval, on the near side and
-   beyond the tolerance, and would count the same zero again as soon as it is passed (Events.ForcesThatAreTurned) */
+/* After an event, sets the functions whose zeros were located to zero, if they still have the values that they had there. Within a
+   long step TSEvent ends its search by the length of the interval, before the zero and with a value above the tolerance, and would
+   find the same zero again as soon as it is passed (Events.ForcesThatAreTurned). */
 static inline void HHT3TakeLocatedForZero(TS ts)
 {
 #if PETSC_VERSION_LT(3, 21, 0)
@@ -145,7 +147,7 @@ static inline void HHT3TakeLocatedForZero(TS ts)
 #endif
 }
 
-/* The functions whose zeros TSEvent looks for */
+/* Evaluates the functions whose zeros TSEvent looks for */
 static inline PetscErrorCode HHT3EventFunctions(TS ts, PetscReal t, Vec U, std::vector<PetscScalar> &f)
 {
   PetscErrorCode failed;
@@ -165,7 +167,8 @@ static inline PetscErrorCode HHT3EventFunctions(TS ts, PetscReal t, Vec U, std::
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After the steps to an event TSEvent goes on with the step that it was begun with, unless the user sets another one: with h, where it is one of those that nobody has set */
+/* After an event TSEvent goes on with the step size with which it was initialized, unless the user has set
+   another one. Replaces this size by h if it is among `unset`, the values that no user has set. */
 static inline void HHT3StepAfterEvent(TS ts, std::initializer_list<PetscReal> unset, PetscReal h)
 {
 #if PETSC_VERSION_LT(3, 21, 0)

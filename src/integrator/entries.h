@@ -1,4 +1,4 @@
-/* Loops over the local entries of vectors of one layout, each of which is read or written. */
+/* Loops over the local entries of vectors of the same layout, which are marked as read or written. */
 #ifndef HHTDAE_ENTRIES_H
 #define HHTDAE_ENTRIES_H
 
@@ -8,7 +8,7 @@
 namespace hht3
 {
 
-/* A vector's local array while a loop has it */
+/* A vector and, while a loop runs, its local array */
 struct Read {
   Vec                vec;
   const PetscScalar *x = nullptr;
@@ -27,7 +27,7 @@ struct Write {
   PetscScalar   &operator[](PetscInt i) const { return x[i]; }
 };
 
-/* get() or restore() of all arrays */
+/* Calls get() or restore() of all arrays */
 template <class Call, class... Arrays>
 PetscErrorCode ForArrays(Call call, Arrays &...arrays)
 {
@@ -39,7 +39,7 @@ PetscErrorCode ForArrays(Call call, Arrays &...arrays)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* loop(), which has the arrays */
+/* Calls loop() with access to the arrays */
 template <class Loop, class... Arrays>
 PetscErrorCode WithArrays(Loop loop, Arrays &...arrays)
 {
@@ -50,7 +50,7 @@ PetscErrorCode WithArrays(Loop loop, Arrays &...arrays)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f(i, x_i, y_i, ...) for all local entries i: ForEntries([](PetscInt i, PetscScalar x, PetscScalar &y) { y += x; }, Read(X), Write(Y)) */
+/* Calls f(i, x_i, y_i, ...) for all local entries i: ForEntries([](PetscInt i, PetscScalar x, PetscScalar &y) { y += x; }, Read(X), Write(Y)) */
 template <class F, class First, class... Rest>
 PetscErrorCode ForEntries(F f, First first, Rest... rest)
 {
@@ -62,7 +62,7 @@ PetscErrorCode ForEntries(F f, First first, Rest... rest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first entry of all ranks for which f(i, x_i, ...), by its global index; -1 if there is none */
+/* *first: the smallest global index, over all ranks, of an entry for which f(i, x_i, ...) is true; -1 if there is none */
 template <class F, class First, class... Rest>
 PetscErrorCode FirstWhere(F f, PetscInt *first, First a, Rest... rest)
 {
@@ -76,7 +76,7 @@ PetscErrorCode FirstWhere(F f, PetscInt *first, First a, Rest... rest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The entry of a vector with this global index, for all ranks */
+/* The entry of a vector with this global index, on all ranks */
 inline PetscErrorCode EntryOf(Vec x, PetscInt index, PetscScalar *entry)
 {
   PetscInt first, end;
@@ -89,7 +89,7 @@ inline PetscErrorCode EntryOf(Vec x, PetscInt index, PetscScalar *entry)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f(i, x_i, ...) for the local entries that are listed */
+/* Calls f(i, x_i, ...) for the local entries i in `list` */
 template <class F, class... Arrays>
 PetscErrorCode ForSome(const std::vector<PetscInt> &list, F f, Arrays... arrays)
 {
@@ -98,7 +98,7 @@ PetscErrorCode ForSome(const std::vector<PetscInt> &list, F f, Arrays... arrays)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum over entries in four parts, which need not wait for one another and lose less to rounding */
+/* Sum over entries in four parts, which the processor adds in parallel, and whose rounding errors are smaller */
 class Sum
 {
 public:

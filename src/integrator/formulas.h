@@ -1,14 +1,14 @@
 /*
   The formulas of the method, as pure functions. "(n)" is the number of an equation in Negrut et al. (2005).
 
-  Both forms share (2): the unknown is an algorithmic acceleration a, from which q and q' follow. They differ in what stands
-  for the true acceleration in the equations of motion:
+  Both forms use (2): the unknown is an algorithmic acceleration a, from which q and q' follow. They differ in the acceleration
+  in the equations of motion:
 
     paper form (9a)       a itself, divided by 1+alpha, and the forces averaged between both ends of the step
     second-order form     (1-af) q''_{n+1} + af q''_n = (1-am) a_{n+1} + am a_n,  equations of motion exact at t_{n+1}
 
-  First-order states s follow the first-order generalized-alpha method of the same spectral radius: with it
-  d s' / d s = d q' / d q = gamma/(beta h), so that one sigma_v serves all columns of the application's Jacobian.
+  First-order states s are integrated by the first-order generalized-alpha method of the same spectral radius. With it
+  d s' / d s = d q' / d q = gamma/(beta h), so that the Jacobian of TSSetI2Jacobian() is needed with one shift sigma_v only.
 */
 #ifndef HHTDAE_FORMULAS_H
 #define HHTDAE_FORMULAS_H
@@ -25,15 +25,15 @@ struct Parameters {
   PetscReal k;               /* position error k h^2 (a_{n+1} - a_n), (26) */
   PetscReal am_s, af_s;      /* the same averages for first-order states */
   PetscReal gamma_s;         /* s_{n+1} = s_n + h [(1-gamma_s) w_n + gamma_s w_{n+1}] */
-  PetscReal k_s;             /* local error k_s h^3 s''' of a state */
+  PetscReal k_s;             /* local error k_s h^3 s''' of a first-order state */
   PetscReal lag() const { return am - af; }         /* a_n is q'' at t_n + lag h */
   PetscReal lagState() const { return am_s - af_s; } /* w_n is s' at t_n + lagState h */
   PetscReal jerk_factor() const { return beta + lag() / 2 - (PetscReal)1 / 6; } /* (2a) misses q by this times h^3 q''' */
   PetscReal ca() const { return (1 - am) / (1 - af); } /* d q''_{n+1} / d a_{n+1}; 1/(1+alpha) for HHT */
 };
 
-/* First-order generalized-alpha (Jansen, Whiting, Hulbert 2000) of spectral radius rho. At equal steps its average of both ends leaves
-   w_n = s' + l h s'' + l (am - 1/2) h^2 s''' at t_n, which makes the local error. */
+/* First-order generalized-alpha (Jansen, Whiting, Hulbert 2000) of spectral radius rho. With equal steps its averages give
+   w_n = s' + l h s'' + l (am - 1/2) h^2 s''' at t_n, l = am - af, from which k_s follows. */
 inline void StateParameters(PetscReal rho, Parameters &p)
 {
   p.am_s    = (3 * rho - 1) / (2 * (1 + rho));
@@ -80,17 +80,17 @@ inline PetscReal ScalePosition(const Parameters &p, PetscReal h) { return p.beta
 inline PetscReal ScaleVelocity(const Parameters &p, PetscReal h) { return p.gamma * h; }
 inline PetscReal ScaleState(const Parameters &p, PetscReal h) { return p.gamma_s * h; }
 
-/* (2a) and (2b): position and velocity from the accelerations at both ends. What a_n is multiplied with; a_{n+1} goes with ScalePosition() and ScaleVelocity(). */
+/* The factors of a_n in (2a) and (2b); those of a_{n+1} are ScalePosition() and ScaleVelocity() */
 inline PetscReal OldPosition(const Parameters &p, PetscReal h) { return h * h * ((PetscReal)0.5 - p.beta); }
 inline PetscReal OldVelocity(const Parameters &p, PetscReal h) { return h * (1 - p.gamma); }
 
-/* How much less the multipliers' oscillation is damped than at alpha = -0.05 (or its spectral radius), 1 down to 0. Phi = 0
-   leaves normal accelerations with the double eigenvalue -rho: what one step leaves in q or q' grows by 1/(1-rho) before it
-   dies out, and what every step leaves, by 1/(1-rho)^2. */
+/* Damping of the multipliers' oscillation relative to that at alpha = -0.05 (or its spectral radius), between 0 and 1. With Phi = 0
+   the accelerations normal to the constraints have the double eigenvalue -rho: an error that one step leaves in q or q' is amplified
+   by 1/(1-rho) before it decays, and one that every step leaves, by 1/(1-rho)^2. */
 inline PetscReal RelativeDamping(PetscReal rho) { return PetscMin(1, (1 - rho) * (PetscReal)(1.05 / 0.1)); }
 
-/* c of (40) for a system with constraints, so that c/(1-rho)^2 does not exceed what it is at alpha = -0.05. At rho = 1 nothing
-   is damped, and what is left of each correction adds up: little. */
+/* c of (40) for a system with constraints: so small that c/(1-rho)^2 does not exceed its value at alpha = -0.05, but not below 1e-5
+   c. At rho = 1 nothing is damped, and the errors that the iterations leave, which add up, are small. */
 inline PetscReal ConstrainedTolerance(PetscReal c, PetscReal rho)
 {
   const PetscReal d = RelativeDamping(rho);

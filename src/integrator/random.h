@@ -1,4 +1,4 @@
-/* Pseudo-random numbers that depend on a global index alone, so that they are the same on any number of ranks. */
+/* Pseudo-random numbers that depend on a seed (`salt`) and a global index only, so that they are the same on any number of ranks. */
 #ifndef HHTDAE_RANDOM_H
 #define HHTDAE_RANDOM_H
 
@@ -7,7 +7,7 @@
 namespace hht3
 {
 
-/* In [-1, 1); other numbers for every salt */
+/* In [-1, 1) */
 inline PetscReal RandomNumber(PetscInt i, unsigned salt)
 {
   unsigned x = (unsigned)i * 2654435761u + (salt + 1) * 2246822519u;
@@ -16,7 +16,7 @@ inline PetscReal RandomNumber(PetscInt i, unsigned salt)
   return (x >> 8) / (PetscReal)(1 << 23) - 1;
 }
 
-/* Entries of x for which which(i) moved by pseudo-random amounts of relative size r */
+/* Changes the entries of x for which which(i) is true by pseudo-random amounts, at most r (1 + |x_i|) */
 template <class Which>
 PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt, const Which &which)
 {
@@ -30,7 +30,8 @@ PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt, const Which &which)
 
 inline PetscErrorCode Shake(Vec x, PetscReal r, unsigned salt) { return Shake(x, r, salt, [](PetscInt) { return true; }); }
 
-/* A state off the initial one, with accelerations about a: there entries may vanish that do not elsewhere, at rest or in a symmetric position */
+/* A state near the initial one, with accelerations about a. At the initial state itself, at rest or in a symmetric position,
+   derivatives may vanish that do not elsewhere. */
 inline PetscErrorCode StateOffStart(TS ts, unsigned salt, PetscReal a, Vec U, Vec V, Vec A)
 {
   PetscFunctionBegin;
@@ -45,7 +46,8 @@ inline PetscErrorCode StateOffStart(TS ts, unsigned salt, PetscReal a, Vec U, Ve
 
 inline PetscReal RandomSign(PetscInt i, unsigned salt) { return RandomNumber(i, salt) < 0 ? -1 : 1; }
 
-/* Of either sign, between a half and one: rounding that neither vanishes by chance nor is the same for all */
+/* A factor for rounding errors: of random sign, and of random size between 1/2 and 1, so that none vanishes by chance and they are
+   not all equal */
 inline PetscReal RandomRounding(PetscInt i, unsigned salt) { return (RandomSign(i, salt) + RandomNumber(i, salt)) / 2; }
 
 } // namespace hht3

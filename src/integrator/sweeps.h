@@ -1,12 +1,11 @@
 /*
-  Sweeps over the entries of vectors that pay more than 2 % of a step of a chain of 1,000 rods against plain loops (entries.h): the stage of every
-  iteration (stage.cpp), 10 % of the instructions, and scaled differences (predictor.cpp), 3 % of the time for the predictor and about 20 % of the instructions for orders
-  above two.
+  Vectorized sweeps over the entries of vectors, where they save more than 2 % of a step of a chain of 1,000 rods against plain loops
+  (entries.h): the stage of every iteration (stage.cpp), 10 % of the instructions, and scaled differences (predictor.cpp), 3 % of the
+  time for the predictor and about 20 % of the instructions for orders above two.
 
-  The body of a sweep is an object with pointers and factors that is called for four entries at a time. The compiler uses
-  the instructions that it is told to, which are those of the oldest processor where a library is made for many: bodies
-  are compiled twice, and the processor at hand decides. There are no fused multiplications, so that both give the same
-  digits.
+  The body of a sweep is an object with pointers and factors that is called for four entries at a time. A library that is built for many
+  processors uses the instructions of the oldest one. So bodies are compiled twice, with and without AVX2, and the processor on which the program
+  runs decides. Neither version has fused multiplications, so that both give the same digits.
 */
 #ifndef HHTDAE_SWEEPS_H
 #define HHTDAE_SWEEPS_H
@@ -19,7 +18,7 @@ namespace hht3
 {
 
 #if defined(__GNUC__) && !defined(__clang__)
-  #pragma GCC diagnostic ignored "-Wpsabi" /* of functions that return Four, all of them inlined */
+  #pragma GCC diagnostic ignored "-Wpsabi" /* warns of functions that return Four; all of them are inlined */
 #endif
 
 typedef PetscScalar Four __attribute__((vector_size(4 * sizeof(PetscScalar)), aligned(sizeof(PetscScalar)), may_alias));
@@ -80,7 +79,7 @@ Body SweepPlain(PetscInt n, Body body)
   return body;
 }
 
-/* body for all entries of arrays of length n; returns it with what it has gathered */
+/* Calls a copy of `body` for all entries of arrays of length n, and returns it with the sums that it has gathered */
 template <class Body>
 Body Sweep(PetscInt n, const Body &body)
 {

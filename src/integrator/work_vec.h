@@ -1,4 +1,5 @@
-/* A work vector that goes with its scope, which an error may end too. What every step may ask for is taken from spare ones, which stay with the run. */
+/* A work vector that is released at the end of its scope, also if an error ends it. Vectors that every step may need are taken from a
+   list of spare ones, which live as long as the run. */
 #ifndef HHTDAE_INTEGRATOR_WORK_VEC_H
 #define HHTDAE_INTEGRATOR_WORK_VEC_H
 
@@ -20,10 +21,11 @@ public:
   WorkVec(const WorkVec &)            = delete;
   WorkVec &operator=(const WorkVec &) = delete;
 
-  /* of zeros */
+  /* A new vector of zeros */
   PetscErrorCode like(Vec other) { return VecDuplicate(other, &v_); }
 
-  /* of any values, from the spare ones if there are any, to which it goes back: a vector of its own is 3 % of the instructions of a small mechanism */
+  /* A vector of any values, from `spare` if it has one; it returns there at the end of the scope. Creating a vector takes 3 % of the
+     instructions of a step of a small mechanism. */
   PetscErrorCode like(Vec other, std::vector<Vec> &spare)
   {
     PetscFunctionBegin;
