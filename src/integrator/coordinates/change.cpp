@@ -177,9 +177,9 @@ PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap
 
   Input Parameters:
 + ts     - the `TS` context
-. test   - whether new coordinates are wanted, or `NULL` for none ever
-. map    - from the old to the new coordinates; `NULL` if `test` never asks for any, and only takes note of accepted states
-. commit - the change is done, or `NULL`
+. test   - tells whether new coordinates are wanted, or `NULL` for never
+. map    - maps the old to the new coordinates; `NULL` if `test` never asks for any, and only takes note of accepted states
+. commit - is told that the change is done, or `NULL`
 - ctx    - context of the three functions
 
   Calling sequence of `test`:
@@ -205,19 +205,19 @@ PetscErrorCode SetCoordinateChange(TS ts, TSHHT3ChangeTest test, TSHHT3ChangeMap
   Level: advanced
 
   Notes:
-  All three are called collectively. `test` sees every accepted state once, at the beginning of the step that starts from it, when monitors
-  and dense output of the last step are over, and initial and otherwise changed states before their consistent start. Where it asks for a
+  All three are called collectively. `test` is called once with every accepted state, at the beginning of the step that starts from it, after monitors
+  and dense output of the last step, and with initial and otherwise changed states before their consistent start. If it asks for a
   change, `map` is called for several triples, at times around that of the state: q^ = T(q), q^' = T_q q', q^'' = T_q q'' + (T_q q')_q q',
   with one and the same smooth T, chosen by `test`. It must not depend on time nor on how often it is called, must change coordinates only,
-  and must leave what it does not change as it is, bit for bit. During `map` the residual is not evaluated; from `commit` on it is, in the
-  new coordinates only. Before a consistent start A is zero and what becomes of it is not used.
+  and must keep entries that it does not change bit for bit. During `map` the residual is not evaluated; from `commit` on it is evaluated in the
+  new coordinates only. Before a consistent start A is zero on entry and not used on return.
 
-  Multipliers, variables and force states keep their values: constraints and definitions must mean the same in both coordinates. Each entry
-  keeps the largest value so far in its weight of the error test, and so should keep its unit and scale.
+  Multipliers, variables and force states keep their values: constraints and definitions must mean the same in both coordinates. As the weight of an entry in the
+  error test contains its largest value so far, its unit and scale should not change.
 
-  A change is not taken back: steps that are rejected or rolled back start again in the new coordinates, without another call of `test`. What
-  the new coordinates depend on belongs into the vector of `TSHHT3SetCheckpointVec()`; after a checkpoint is loaded, `commit` is called for
-  the application to read it there.
+  A change is not undone: steps that are rejected or rolled back start again in the new coordinates, without another call of `test`. All data on
+  which the new coordinates depend have to be in the vector of `TSHHT3SetCheckpointVec()`; after a checkpoint is loaded, `commit` is called so that
+  the application reads it there.
 
 .seealso: `TSHHT3`, `TSHHT3SetCheckpointVec()`, `TSRestartStep()`, `TSRollBack()`
 @*/

@@ -236,14 +236,14 @@ PetscErrorCode SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferB
   Input Parameters:
 + ts        - the `TS` context
 . rotations - for each rotation vector the global index of the first of its three coordinates, on the rank that owns all three; or `NULL`
-. refer     - takes a new reference
-. back      - takes the reference before the last call of `refer` again
+. refer     - makes given attitudes the reference
+. back      - restores the reference from before the last call of `refer`
 - ctx       - context of both
 
   Calling sequence of `refer`:
 + ts  - the `TS` context
-. U   - coordinates, about the present reference: rotation vectors x turn attitudes A = exp([x]) A_reference about axes of space. These attitudes
-        become the reference and rotation vectors zero, all other entries stay as they are
+. U   - on entry coordinates relative to the present reference: a rotation vector x stands for the attitude A = exp([x]) A_reference, in axes of space.
+        These attitudes become the reference: on return the rotation vectors are zero, and all other entries as they were
 - ctx - the context
 
   Calling sequence of `back`:
@@ -256,20 +256,20 @@ PetscErrorCode SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3ReferB
   Velocities of such coordinates are angular velocities in axes of space, accelerations their derivatives; neither depends on the reference.
   With T(x) such that dA = [T dx] A, rows of their equations of motion and columns of constraints have to belong to dx, as with any other
   coordinates: moments and rotational reactions are multiplied by the transpose of T. T is singular at a full turn: a step
-  that makes one fails and is made shorter. Far below it the series needs more terms: `TSHHT3SetStepLimit()` should keep the rotation of a step
-  within a radian.
+  that makes one fails and is repeated with a smaller h. The series is not accurate for rotations that large: `TSHHT3SetStepLimit()` should limit the rotation in a step
+  to a radian.
 
   Both functions are called collectively, `refer` with every accepted state at the beginning of the step that starts from it, and with states at
-  which accelerations and multipliers are solved for; of these `back` comes next. What the reference is belongs into the vector of
+  which accelerations and multipliers are solved for; after the latter `back` is called next. The reference attitudes have to be in the vector of
   `TSHHT3SetCheckpointVec()`.
 
-  In fast rotation the matrix should know of `TSHHT3GetRotationFactor()`.
+  In fast rotation the Jacobian should contain the factor of `TSHHT3GetRotationFactor()`.
 
   The method is the generalized-alpha method on a Lie group (Bruels, Cardona, Arnold, Mech. Mach. Theory 48, 2012), with the second term of Magnus'
   series in the rotation of a step. It is of second order from the first step on, for multipliers too, and has no singular attitudes. Above order two (`-ts_hhtdae_order`)
   rotation vectors of several steps are differentiated about the last attitude. These must be within half a turn of it: where a body turns faster, the order is lower.
 
-  Monitors see U about the reference of the last step.
+  In monitors U is relative to the reference of the last step.
 
 .seealso: `TSHHT3`, `TSHHT3GetRotationFactor()`, `TSHHT3SetCoordinateChange()`, `TSHHT3SetCheckpointVec()`
 @*/
@@ -282,7 +282,7 @@ PetscErrorCode TSHHT3SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3
 }
 
 /*@
-  TSHHT3GetRotationFactor - How rotation vectors depend on angular velocities in the step whose matrix is asked for
+  TSHHT3GetRotationFactor - How rotation vectors depend on angular velocities in the step whose Jacobian is being evaluated
 
   Not Collective
 
@@ -296,9 +296,9 @@ PetscErrorCode TSHHT3SetRotations(TS ts, IS rotations, TSHHT3Refer refer, TSHHT3
   Level: advanced
 
   Note:
-  To be called by the function of `TSSetI2Jacobian()`, if at all. With s the first of its shifts, the derivatives by a rotation vector U
-  stand for (1 - factor s [w]) dU, where [w] dU is the cross product with the angular velocity w of `begin`: those of the residual by U, not those by
-  U' and U'', are to be multiplied by that matrix from the right. Without it corrections of stiff forces and constraints across the axis of w converge at the
+  Only for the function of `TSSetI2Jacobian()`, which need not call it. With s the first of its shifts, a change dU of a rotation vector in the Newton matrix
+  changes the rotation by (1 - factor s [w]) dU, where [w] dU is the cross product with the angular velocity w of `begin`. So the derivatives of the residual with respect to U, not those
+  with respect to U' and U'', are to be multiplied by that matrix from the right. Without it corrections of stiff forces and constraints across the axis of w converge at the
   rate 0.16 h |w|.
 
 .seealso: `TSHHT3`, `TSHHT3SetRotations()`

@@ -140,7 +140,7 @@ PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBoo
   *good = (PetscBool)(c.forces <= tol);
   if (*good || c.it - c.base < 2) PetscFunctionReturn(PETSC_SUCCESS);
   if (c.forces < unanswered_fraction * before) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MeasureRounding(ts, X, F, I.verify.noise)); /* FullBodyDynamics.CantileverSwingsAtItsFrequency */
+  PetscCall(MeasureRounding(ts, X, F, I.verify.noise)); /* what does not follow may be rounding (FullBodyDynamics.CantileverSwingsAtItsFrequency) */
   PetscCall(InDriven(ts, F, &c.forces));
   *good = (PetscBool)(c.forces <= tol);
   PetscFunctionReturn(PETSC_SUCCESS);

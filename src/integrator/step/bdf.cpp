@@ -95,7 +95,7 @@ PetscErrorCode LeaveBDF(TS ts)
 
 } // namespace
 
-/* tau_1, tau_2, ... for a step to t1 */
+/* tau_j = t1 - t_{n+1-j}, j = 1, 2, ..., of a step to t1, as far as the history reaches */
 void Spans(const Order &o, PetscReal t1, PetscReal tau[])
 {
   for (PetscInt j = 0; j <= o.past; j++) tau[j] = t1 - o.t[j];

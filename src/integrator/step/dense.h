@@ -10,7 +10,8 @@ namespace hht3
 /* The position of t in the last step, from 0 to 1, exact at the ends */
 PetscReal StepFraction(const Integrator &I, PetscReal t);
 
-/* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
+/* U, U', U'' at a time t between the ends of the last accepted step; any of U, V, A may be NULL. Interpolate(): by polynomials.
+   EvaluateAt(): accelerations and multipliers by the equations. IsBeginOfStep(): t is the time of the only known state. */
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A);
 bool           IsBeginOfStep(TS ts, PetscReal t);
 PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A);

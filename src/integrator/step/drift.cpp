@@ -51,7 +51,7 @@ PetscErrorCode SolveNormal(TS ts, Vec dV)
 {
   Integrator &I = Get(ts);
   KSP         ksp;
-  PetscBool   ok, reuse; /* the user's */
+  PetscBool   ok, reuse; /* reuse: the user's setting */
 
   PetscFunctionBegin;
   PetscCall(SNESGetKSP(ts->snes, &ksp));

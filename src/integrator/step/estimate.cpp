@@ -78,7 +78,7 @@ static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Y_i and the weights after U has been accepted; all: of every entry */
+/* Updates Y_i and the weights after U has been accepted; all: of every entry, and not only where Y_i has grown */
 PetscErrorCode UpdateWeights(TS ts, Vec U, bool all)
 {
   Integrator &I   = Get(ts);

@@ -4,7 +4,7 @@
 namespace hht3
 {
 
-/* Before an attempt from t_n; steps of fixed length are left alone */
+/* Called before an attempt from t_n. Steps of fixed length are not changed. */
 PetscErrorCode ApplyStepLimit(TS ts)
 {
   Integrator &I = Get(ts);
@@ -50,14 +50,14 @@ $ PetscErrorCode limit(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, vo
 . U     - the solution, read-only
 . V     - its first time derivative, read-only
 . A     - its second time derivative, read-only
-. h     - in: as long as one likes; out: the longest step, the same on all ranks
+. h     - on entry the largest number, which is no limit; on return the longest step, the same on all ranks
 - ctx   - the context
 
   Level: advanced
 
   Note:
-  The error estimate looks at both ends of a step. Where something may begin and end between them, as when a body flies
-through another one, only the application knows. It is asked before every attempt of a step of variable length.
+  The error estimate uses values at the ends of a step. It does not show what begins and ends between them, as when a body flies
+through another one. The function is called before every attempt of a step of variable length.
 
 .seealso: `TSHHT3`, `TSHHT3SetCoordinateChange()`
 @*/

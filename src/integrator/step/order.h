@@ -18,7 +18,7 @@ void ResetOrder(TS ts);
 PetscErrorCode UseOrder(TS ts);
 PetscErrorCode PrepareBDF(TS ts);
 
-/* tau_1, tau_2, ... for a step to t1 */
+/* tau_j = t1 - t_{n+1-j}, j = 1, 2, ..., of a step to t1, as far as the history reaches */
 void Spans(const Order &o, PetscReal t1, PetscReal tau[]);
 
 /* The local error of an attempt of order above two, in units of the tolerance */

@@ -92,9 +92,9 @@ PetscErrorCode MonitorProgress(TS ts, PetscInt step, PetscReal t, Vec, void *)
   Level: intermediate
 
   Note:
-  Residuals, Jacobians, factorizations and solves are those of starts and steps. What the set-up evaluates to find the roles of the unknowns (ten Jacobians; none after
-  `TSHHT3SetIS()` in the second-order form) and what constraints depend on, what checkpoints evaluate, and samples between steps, `TSHHT3EvaluateAt()`, are no part of the run: -log_view has them too, in
-  TSFunctionEval and TSJacobianEval.
+  Residuals, Jacobians, factorizations and solves are those of starts and steps. Not counted are evaluations at set-up, which find the roles of the unknowns (ten Jacobians; none after
+  `TSHHT3SetIS()` in the second-order form) and what constraints depend on, those of checkpoints, and those of samples between steps, `TSHHT3EvaluateAt()`. The events TSFunctionEval and
+  TSJacobianEval of -log_view contain them all.
 
 .seealso: `TSHHT3`, `TSGetStepRejections()`, `TSGetSNESIterations()`
 @*/

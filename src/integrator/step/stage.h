@@ -8,7 +8,7 @@
 namespace hht3
 {
 
-/* Before the first residual of an attempt, and again where h, the state at t_n or the drift of its velocities have changed */
+/* Called before the first residual of an attempt, and again after h, the state at t_n or the drift of its velocities have changed */
 PetscErrorCode PrepareStage(TS ts);
 
 /* U1, V1, A1 from X */
