@@ -126,7 +126,7 @@ PetscErrorCode StepAfterChange(TS ts)
   if (!(e > 1)) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal next =
       PetscMax(I.h * PetscMax(least_cut, 0.9 * PetscPowReal(e, (PetscReal)-1 / order)), PetscMin(ts->adapt->dt_min, I.h));
-  PetscCall(PetscInfo(ts, "h = %g would miss the tolerance %g times in the new coordinates, %g\n", (double)I.h,
+  PetscCall(PetscInfo(ts, "h = %g would make an error of %g times the tolerance in the new coordinates: cut to %g\n", (double)I.h,
                       (double)e, (double)next));
   ts->time_step = next;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -231,7 +231,7 @@ PetscErrorCode VerifyCorrection(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluate
       PetscFunctionReturn(PETSC_SUCCESS);
     }
   }
-  PetscCall(PetscInfo(ts, "corrector: a correction of %g of the tolerance at t = %g is no proof: the residual, %g of the tolerance by inertia alone, has not followed (%g of it as before)\n",
+  PetscCall(PetscInfo(ts, "corrector: the residual has not followed a correction of %g of the tolerance at t = %g: with inertia alone it moves positions by %g of the tolerance (part %g of it as before)\n",
                       (double)c.e, (double)I.t1, (double)left.all, (double)left.part));
   if (c.matrix.fresh) PetscCall(CheckJacobian(ts, dX, F, &c.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -27,7 +27,7 @@ PetscErrorCode HoldStep(TS ts, PetscReal h, PetscReal *next)
   PetscFunctionBegin;
   if (I.h_limit > 0 && *next > I.h_limit) *next = PetscMax(h, I.h_limit);
   if (*next <= h || *next >= I.corrector.hold * h) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "h = %g is held, not worth %g\n", (double)h, (double)*next));
+  PetscCall(PetscInfo(ts, "h stays at %g: growth to %g is not worth a new matrix\n", (double)h, (double)*next));
   *next = h;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -182,7 +182,7 @@ PetscErrorCode CutPast(TS ts, PetscInt n)
   if (n == o.past) PetscFunctionReturn(PETSC_SUCCESS);
   o.past = n;
   if (o.now == 2 || o.now <= n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscInfo(ts, "bodies turn too far in %" PetscInt_FMT " steps for order %" PetscInt_FMT " at t = %g\n", o.now, o.now, (double)ts->ptime));
+  PetscCall(PetscInfo(ts, "bodies rotate too far in %" PetscInt_FMT " steps for order %" PetscInt_FMT " at t = %g\n", o.now, o.now, (double)ts->ptime));
   o.now   = n < 3 ? 2 : n;
   o.since = 0;
   PetscFunctionReturn(PETSC_SUCCESS);

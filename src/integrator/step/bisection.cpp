@@ -79,7 +79,7 @@ PetscErrorCode BisectIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
   PetscCall(VecDot(along, dX, &moved));
   PetscCall(Bisect(ts, {X, dX, begin, along, next}, PetscRealPart(moved), F, &s, found));
   if (!*found) PetscCall(VecWAXPY(X, -1, dX, begin));
-  else PetscCall(PetscInfo(ts, "corrector: corrections turn back at t = %g, h = %g; the solution is at %g of the last one\n", (double)I.t1, (double)I.h, (double)s));
+  else PetscCall(PetscInfo(ts, "corrector: corrections alternate in direction at t = %g, h = %g; bisection goes to %g of the last one\n", (double)I.t1, (double)I.h, (double)s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

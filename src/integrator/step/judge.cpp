@@ -190,8 +190,8 @@ PetscErrorCode FailUnproved(TS ts)
   I.corrector.reason = SNES_DIVERGED_DTOL;
   if (I.corrector.wrong_jacobian) I.corrector.jacobian_faults += 1;
   PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure),
-                          "the residual does not follow the corrections at t = %g, h = %g: the Jacobian (TSSetI2Jacobian()) claims up to %g times the "
-                          "inertia of an unknown, which the residual does not show; -snes_test_jacobian compares the two. If it is right, roles found at the start hold no longer: TSHHT3SetIS()",
+                          "the residual does not follow the corrections at t = %g, h = %g: the Jacobian (TSSetI2Jacobian()) has a stiffness of up to %g times the "
+                          "inertia of an unknown, which the residual has not; -snes_test_jacobian compares the two. If the Jacobian is right, the roles of unknowns detected at the start may no longer hold: give them by TSHHT3SetIS()",
                           (double)I.t1, (double)I.h, (double)I.verify.largest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -232,7 +232,7 @@ PetscErrorCode AttemptStep(TS ts, PetscBool *tiny, PetscBool *ok)
   /* TSAdaptCheckStage() judges by the last SNESConvergedReason, and so misses a failure before SNESSolve(): then time_step is cut here */
   PetscCall(TSAdaptCheckStage(ts->adapt, ts, I.t1, I.U1, &stage));
   if (!*ok && stage) ts->time_step *= ts->adapt->scale_solve_failed;
-  if (*ok && !stage) PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "TSAdapt, or the function of TSSetFunctionDomainError(), does not take the state at t = %g", (double)I.t1));
+  if (*ok && !stage) PetscCall(PetscSNPrintf(I.failure, sizeof(I.failure), "TSAdapt, or the function of TSSetFunctionDomainError(), rejects the state at t = %g", (double)I.t1));
   *ok = (PetscBool)(*ok && stage);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -341,7 +341,7 @@ PetscErrorCode PassStops(TS ts)
   PetscCall(HHT3PassStops(ts, &passed));
   /* PETSc 3.18 does this with any integrator (Events.ThatGoBackAreRefused) */
   PetscCheck(ts->time_step > 0 || !HHT3EventActive(ts), PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
-             "TSEvent asks for a step of %g at t = %g, as it does in some versions of PETSc where a function with a direction crosses zero the other way: set direction 0, and let the handler see which way it goes",
+             "TSEvent asks for a step of %g at t = %g, as it does in some versions of PETSc where a function with a direction crosses zero the other way: set direction 0, and let the event handler tell the direction",
              (double)ts->time_step, (double)ts->ptime);
   const bool cut = ts->time_step < 0 && I.stat.steps > 0 && ts->exact_final_time == TS_EXACTFINALTIME_MATCHSTEP; /* by a TSSolve() to a time in the past */
   if (ts->time_step != 0 && !cut && !(ts->time_step < 0 && (passed || resumed))) PetscFunctionReturn(PETSC_SUCCESS);
