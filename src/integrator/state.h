@@ -201,7 +201,7 @@ struct Hooks {
   PetscObjectState                      values[2] = {}; /* states of J and P after the last correction; others: someone else has changed their values */
 };
 
-/* What normal_jerk holds: nothing, all of the vector d of drift.cpp (for a start q''' itself), or its part normal to the constraints */
+/* What normal_jerk holds: nothing, the vector d of drift.cpp, or the part normal to the constraints of d or, after a start, of q''' */
 enum class Jerk { None, Whole, Normal };
 
 /* Whether loads or motions set in later in the run, excitation.cpp */

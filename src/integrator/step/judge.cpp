@@ -6,9 +6,8 @@
   correction, the rate last measured with the same matrix is used.
 
   Where h is not set by the error test (fixed steps, a largest h) the error of the step is far below the tolerance, and an
-  iteration error of c times the tolerance would dominate it. Then c refers to the error estimate of the last step instead: without
-  limit under error control, but not below a hundredth of the tolerance while h_limit holds; without limit, and fifty times more
-  strictly, at fixed steps.
+  iteration error of c times the tolerance would dominate it. Then c refers to the error estimate of the last step instead, however
+  small it is; under error control to at least a hundredth of the tolerance while h_limit holds, at fixed steps fifty times more strictly.
 
   Corrections that no longer decrease are accepted if rounding makes corrections of their size. This is measured at the iterate
   (rounding.cpp) and holds for this iteration alone: in a position where Phi_q nearly loses rank, rounding is far above that of later
