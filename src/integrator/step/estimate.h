@@ -16,8 +16,8 @@ PetscErrorCode FollowTolerances(TS ts, Vec U);
    (NORM_INFINITY) */
 PetscErrorCode ReduceNorm(TS ts, NormType type, PetscReal local, PetscReal *norm);
 
-/* The size of a correction in units of the tolerance: by how much it changes the error estimate of a step of length h, (40). For h =
-   1 it is |k| times the weighted norm. */
+/* The size of a correction in units of the tolerance: by how much it changes the error estimate of a step of length h, (40). With
+   h = 1 it is |k| times the weighted norm. */
 PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal h, PetscReal *e);
 
 /* The same from this rank's sum of squares of weighted entries */
