@@ -27,7 +27,7 @@ PetscErrorCode SNESConverged_HHT(SNES snes, PetscInt it, PetscReal xnorm, PetscR
 /* Whether the vectors, the first of which is a residual at t, are finite; if not, I.failure names the row */
 PetscErrorCode CheckNumbers(TS ts, PetscReal t, std::initializer_list<Vec> all, PetscBool *ok);
 
-/* dX = J^{-1} r with the present Newton matrix, and its size in units of the tolerance, 0 if the solve fails. As no further
+/* dX = J^{-1} r with the present Newton matrix, and its size in units of the tolerance, infinite if the solve fails. As no further
    correction follows that would remove the error of this one, the solve is an accurate one. */
 PetscErrorCode CorrectionFor(TS ts, Vec r, Vec dX, PetscBool *solved);
 PetscErrorCode SizeOfCorrectionFor(TS ts, Vec r, Vec dX, PetscReal *e);

@@ -271,7 +271,7 @@ PetscErrorCode AskNextCorrection(TS ts, Vec X, Vec dX, Vec F)
   PetscFunctionBegin;
   PetscCall(SizeOfCorrectionFor(ts, F, next, &e));
   const PetscReal xi = c.e > 0 ? e / c.e : 0;
-  if (CorrectorError(xi, e) <= tol) PetscFunctionReturn(PETSC_SUCCESS);
+  if (e < PETSC_INFINITY && CorrectorError(xi, e) <= tol) PetscFunctionReturn(PETSC_SUCCESS);
   if (e <= immediate_tolerance * tol) PetscCall(ContinuesCorrection(I, dX, next, work, &goes_on));
   if (goes_on && c.base && xi >= stagnation_ratio) PetscCall(IsRounding(ts, X, &rounding));
   if (!goes_on || rounding) PetscFunctionReturn(PETSC_SUCCESS);

@@ -33,16 +33,16 @@ PetscErrorCode CorrectionFor(TS ts, Vec r, Vec dX, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Its size in units of the tolerance; 0 if the solve fails */
+/* Its size in units of the tolerance; infinite if the solve fails, since nothing is known then */
 PetscErrorCode SizeOfCorrectionFor(TS ts, Vec r, Vec dX, PetscReal *e)
 {
   PetscBool solved;
 
   PetscFunctionBegin;
-  *e = 0;
+  *e = PETSC_INFINITY;
   PetscCall(CorrectionFor(ts, r, dX, &solved));
   if (solved) PetscCall(CorrectionNorm(ts, dX, Get(ts).h, e));
-  if (PetscIsInfOrNanReal(*e)) *e = 0;
+  if (PetscIsNanReal(*e)) *e = PETSC_INFINITY;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -66,7 +66,7 @@ PetscErrorCode RoundingOfCorrection(TS ts, Vec X, PetscReal *e)
   for (unsigned salt = 0; salt < 2; salt++) {
     PetscCall(ForEntries([&](PetscInt i, PetscScalar size, PetscScalar &x) { x = size * RandomRounding(first + i, salt); }, Read(noise), Write(r)));
     PetscCall(SizeOfCorrectionFor(ts, r, F, &sample));
-    *e = PetscMax(*e, sample);
+    if (sample < PETSC_INFINITY) *e = PetscMax(*e, sample);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
