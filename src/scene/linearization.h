@@ -12,9 +12,20 @@ namespace hhtdae
 /* x, x', x'' of own unknowns */
 using SmallMotion = std::array<std::vector<double>, 3>;
 
-/* First time derivatives of rows of C and K along the motion that is linearized, and the second one of K; columns: all unknowns */
-struct RowRates {
-  Eigen::MatrixXd C, K, second_K;
+/* Rows of constraints of C and K, and M with all of its rows; columns: all unknowns */
+struct RowValues {
+  Eigen::MatrixXd C, K, M;
+};
+
+/* Their first time derivatives along the motion that is linearized, and the second ones of K and M */
+struct RowRates : RowValues {
+  Eigen::MatrixXd second_K, second_M;
+
+  void setZero(Eigen::Index rows, Eigen::Index columns)
+  {
+    for (Eigen::MatrixXd *x : {&C, &K, &second_K}) *x = Eigen::MatrixXd::Zero(rows, columns);
+    for (Eigen::MatrixXd *x : {&M, &second_M}) *x = Eigen::MatrixXd::Zero(columns, columns);
+  }
 };
 
 struct Linearization::Work {
@@ -48,11 +59,11 @@ struct Linearization::Work {
   PetscErrorCode pointLoad(const Excitation &in, std::vector<double> *b) const;
   PetscErrorCode groundLoad(const Vector3 &ground, std::vector<double> *b) const;
   PetscErrorCode toState(const SmallMotion &x, Vec d[3]) const;
-  /* rates of these rows of constraints, with the variables that they read eliminated; global numbers */
+  /* rates of these rows of constraints, with the variables that they read eliminated, and of M; global numbers. Zero where there is no constraint. */
   PetscErrorCode rates(const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const;
   PetscErrorCode ratesInTime(double e, bool at_rest, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const;
   PetscErrorCode ratesBy(double e, bool of_time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const;
-  PetscErrorCode rowsAt(double later, double time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, Eigen::MatrixXd *of_C, Eigen::MatrixXd *of_K) const;
+  PetscErrorCode rowsAt(double later, double time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowValues *out) const;
   PetscErrorCode characteristicRate(double *rate) const;
   PetscErrorCode setState(Vec at[3]) const; /* takes this state, near `state`, into `perturbed` */
   PetscErrorCode linearizeAt(double later, double time, Work *w) const;

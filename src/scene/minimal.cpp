@@ -15,6 +15,9 @@
 
     z' = N^T v,    y' = L^T q'' + L.^T (P q + S s),    s' from above.
 
+  That holds where masses stay 1, in axes in which inertia does not turn. The inertia of a body that turns in these axes changes, and with it the lengths of the columns
+  of N in the metric of the masses, m = N^T M N. So the coordinates that are handed out are R z, with R R = m, and their rates (Metric).
+
   All of this is in coordinates for which masses are 1 (Work::unit), with rows of constraints of norm 1: in metres, radians and modal coordinates, whose magnitudes differ the more
   the smaller the bodies are, orthonormal bases would lose digits (SmallBodies.StateSpace).
 */
@@ -105,6 +108,7 @@ struct Minimal {
   Dense                N, L, P, S;
   Dense                y; /* (q'', s', rest) from (z, y, s, f) */
   Dense                A, B;
+  Dense                original; /* (z, y, s, f) above from the states that are handed out and inputs */
   Eigen::Index          dz() const { return N.cols(); }
   Eigen::Index          dy() const { return L.cols(); }
   Eigen::Index          ds() const { return (Eigen::Index)s.size(); }
@@ -134,6 +138,34 @@ Dense SolveEquilibrated(Dense W, Dense right)
   return column.asDiagonal() * right;
 }
 
+/* The metric of the masses on a basis X that changes at the rate X1: X^T M X and its rate; with the second rates X2 and M2 the second rate of it, too */
+struct BasisMetric {
+  Dense m, m1, m2;
+
+  BasisMetric(const Dense &X, const Dense &X1, const Dense &X2, const Dense &M, const Dense &M1, const Dense &M2)
+  {
+    const auto twice = [](const Dense &A) { return Dense(A + A.transpose()); };
+    m  = X.transpose() * M * X;
+    m1 = twice(X1.transpose() * M * X) + X.transpose() * M1 * X;
+    m2 = twice(X2.transpose() * M * X + 2 * X1.transpose() * M1 * X) + 2 * X1.transpose() * M * X1 + X.transpose() * M2 * X;
+  }
+
+  /* c with c^T m c = 1. Directions with next to no inertia beside the others, whose length would be rounding, stay longer. */
+  Dense unitLength() const
+  {
+    constexpr double    least = 1e-6; /* of the largest eigenvalue */
+    const PetscBLASInt  n = (PetscBLASInt)m.rows(), leading = PetscMax(n, 1), size = 64 * leading;
+    Dense               V = m;
+    Eigen::VectorXd     length(n);
+    std::vector<double> work(size);
+    PetscBLASInt        info = 0;
+    LAPACKsyev_("V", "U", &n, V.data(), &leading, length.data(), work.data(), &size, &info);
+    if (info || !n || !(length(n - 1) > 0)) return Dense::Identity(n, n);
+    for (PetscBLASInt k = 0; k < n; k++) length(k) = 1 / std::sqrt(std::max(length(k), least * length(n - 1)));
+    return V * length.asDiagonal() * V.transpose();
+  }
+};
+
 /* Scales the matrices to units in which masses are 1 and rows of constraints have norm 1, with their multipliers; and the rates of these rows */
 void ToUnits(Minimal &m, Dense &M, Dense &C, Dense &K, const std::vector<PetscInt> &constraints, RowRates &rates)
 {
@@ -146,8 +178,30 @@ void ToUnits(Minimal &m, Dense &M, Dense &C, Dense &K, const std::vector<PetscIn
     }
   for (Dense *X : {&M, &C, &K}) *X = row.asDiagonal() * *X * row.asDiagonal();
   m.unit.array() *= row.array();
+  for (Dense *X : {&rates.M, &rates.second_M}) *X = m.unit.asDiagonal() * *X * m.unit.asDiagonal();
   for (Dense *X : {&rates.C, &rates.K, &rates.second_K})
     for (Eigen::Index i = 0; i < X->rows(); i++) X->row(i) = m.unit(constraints[i]) * X->row(i) * m.unit.asDiagonal();
+}
+
+/* The states X (z, y, s) in place of (z, y, s): with c^T m c = 1, R R = c^T m(t) c and E the coordinates of the columns of L in the basis N they are R c^{-1} z, whose rate is
+   E^T (R c^{-1} z)' where rows at velocity level leave it, and s. A = X' X^{-1} + X A X^{-1}. across: L^T M N */
+void InUnitsOfMass(Minimal &m, Eigen::Index inputs, const BasisMetric &positions, const BasisMetric &velocities, const Dense &across)
+{
+  const Eigen::Index nz = m.dz(), ny = m.dy(), n = m.states();
+  const Dense        c = positions.unitLength(), d = velocities.unitLength(), E = d.transpose() * across * c, m1 = c.transpose() * positions.m1 * c;
+  const Dense        R1 = m1 / 2, R2 = c.transpose() * positions.m2 * c / 2 - m1 * m1 / 4, toz = SolveEquilibrated(c, Dense::Identity(nz, nz)), toy = SolveEquilibrated(d, Dense::Identity(ny, ny));
+  Dense              X = Dense::Identity(n, n), X1 = Dense::Zero(n, n);
+  X.topLeftCorner(nz, nz)   = toz;
+  X.block(nz, 0, ny, nz)    = E * R1 * toz;
+  X.block(nz, nz, ny, ny)   = toy;
+  X1.topLeftCorner(nz, nz)  = R1 * toz;
+  X1.block(nz, 0, ny, nz)   = E * R2 * toz;
+  X1.block(nz, nz, ny, ny)  = d.transpose() * velocities.m1 * d / 2 * toy;
+  const Dense back          = SolveEquilibrated(X, Dense::Identity(n, n));
+  m.A                       = (X1 + X * m.A) * back;
+  m.B                       = X * m.B;
+  m.original                = Dense::Identity(n + inputs, n + inputs);
+  m.original.topLeftCorner(n, n) = back;
 }
 
 PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation> &in, Minimal &m)
@@ -240,14 +294,19 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
   result << m.N.transpose() * expand.middleRows(nq, nq), m.L.transpose() * m.y.topRows(nq) + turn.transpose() * nonminimal_velocity, m.y.middleRows(nq, ns);
   m.A = result.leftCols(m.states());
   m.B = result.rightCols(nf);
+
+  const Dense mass = Block(M, m.q, m.q), mass_rate = Block(rates.M, m.q, m.q), N1 = position.least(-of_v_rate.topRows(h) * m.N);
+  const Dense N2 = position.least(-2 * of_v_rate.topRows(h) * N1 - second.topRows(h) * m.N) - m.N * (N1.transpose() * N1);
+  InUnitsOfMass(m, nf, {m.N, N1, N2, mass, mass_rate, Block(rates.second_M, m.q, m.q)}, {m.L, turn, Dense::Zero(nq, m.dy()), mass, mass_rate, Dense::Zero(nq, nq)}, m.L.transpose() * mass * m.N);
   PetscFunctionReturn(0);
 }
 
-/* x, x', x'' of own unknowns from (z, y, s) and inputs */
-template <class T> void Unknowns(const Linearization::Work &w, const Minimal &m, const Eigen::Matrix<T, Eigen::Dynamic, 1> &state, std::array<std::vector<T>, 3> &x)
+/* x, x', x'' of own unknowns from states and inputs */
+template <class T> void Unknowns(const Linearization::Work &w, const Minimal &m, const Eigen::Matrix<T, Eigen::Dynamic, 1> &given, std::array<std::vector<T>, 3> &x)
 {
   using Vector          = Eigen::Matrix<T, Eigen::Dynamic, 1>;
   const PetscInt start  = w.R->start, n = w.R->n;
+  const Vector   state  = m.original * given;
   const Vector   z = state.head(m.dz()), y = state.segment(m.dz(), m.dy()), s = state.segment(m.dz() + m.dy(), m.ds());
   const Vector   q = m.N * z, v = m.L * y + m.P * q + m.S * s, other = m.y * state;
   for (auto &c : x) c.assign(n, 0);

@@ -159,9 +159,8 @@ void EliminateVariables(const std::vector<PetscInt> &rows, const std::vector<Pet
   }
 }
 
-/* These rows of C and K after `later` seconds of the motion, with t = time */
-PetscErrorCode Linearization::Work::rowsAt(double later, double time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, Eigen::MatrixXd *of_C,
-                                           Eigen::MatrixXd *of_K) const
+/* These rows of C and K, and M, after `later` seconds of the motion, with t = time */
+PetscErrorCode Linearization::Work::rowsAt(double later, double time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowValues *out) const
 {
   Work            w;
   Eigen::MatrixXd X, Y;
@@ -169,9 +168,10 @@ PetscErrorCode Linearization::Work::rowsAt(double later, double time, const std:
   PetscCall(linearizeAt(later, time, &w));
   PetscCall(GatherDense(w.C, X));
   PetscCall(GatherDense(w.K, Y));
+  PetscCall(GatherDense(w.M, out->M));
   EliminateVariables(rows, variables, X, Y);
-  *of_C = RowsOf(X, rows);
-  *of_K = RowsOf(Y, rows);
+  out->C = RowsOf(X, rows);
+  out->K = RowsOf(Y, rows);
   PetscFunctionReturn(0);
 }
 
@@ -179,23 +179,24 @@ PetscErrorCode Linearization::Work::rowsAt(double later, double time, const std:
 PetscErrorCode Linearization::Work::ratesBy(double e, bool of_time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
 {
   constexpr double first[5] = {1. / 12, -8. / 12, 0, 8. / 12, -1. / 12}, second[5] = {-1. / 12, 16. / 12, -30. / 12, 16. / 12, -1. / 12};
-  Eigen::MatrixXd  of_C, of_K, C0, K0;
+  RowValues        now, middle;
   PetscFunctionBegin;
   for (int k = 0; k < 5; k++) {
     const double at = (k - 2) * e;
-    PetscCall(rowsAt(at, of_time ? t + at : t, rows, variables, &of_C, &of_K));
-    if (!k)
-      for (Eigen::MatrixXd *x : {&out->C, &out->K, &out->second_K}) *x = Eigen::MatrixXd::Zero(of_K.rows(), of_K.cols());
-    out->C += first[k] / e * of_C;
-    out->K += first[k] / e * of_K;
-    out->second_K += second[k] / (e * e) * of_K;
-    if (k != 2) continue;
-    C0 = of_C;
-    K0 = of_K;
+    PetscCall(rowsAt(at, of_time ? t + at : t, rows, variables, &now));
+    if (!k) out->setZero((Eigen::Index)rows.size(), now.M.cols());
+    out->C += first[k] / e * now.C;
+    out->K += first[k] / e * now.K;
+    out->M += first[k] / e * now.M;
+    out->second_K += second[k] / (e * e) * now.K;
+    out->second_M += second[k] / (e * e) * now.M;
+    if (k == 2) middle = now;
   }
-  DropRounding(C0, 1 / e, out->C);
-  DropRounding(K0, 1 / e, out->K);
-  DropRounding(K0, 1 / (e * e), out->second_K);
+  DropRounding(middle.C, 1 / e, out->C);
+  DropRounding(middle.K, 1 / e, out->K);
+  DropRounding(middle.M, 1 / e, out->M);
+  DropRounding(middle.K, 1 / (e * e), out->second_K);
+  DropRounding(middle.M, 1 / (e * e), out->second_M);
   PetscFunctionReturn(0);
 }
 
@@ -210,16 +211,16 @@ static double RelativeDifference(const Eigen::MatrixXd &a, const Eigen::MatrixXd
    changed by difference_step relatively. */
 PetscErrorCode Linearization::Work::ratesInTime(double e, bool at_rest, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
 {
-  Eigen::MatrixXd C0, K0, X, Y;
-  RowRates        current, before;
-  double          best = INFINITY;
+  RowValues start, other;
+  RowRates  current, before;
+  double    best = INFINITY;
   PetscFunctionBegin;
-  PetscCall(rowsAt(0, t, rows, variables, &C0, &K0));
+  PetscCall(rowsAt(0, t, rows, variables, &start));
   for (int k = 0; at_rest && k < max_step_changes; k++) {
     double change = 0;
     for (double at : {e, e / golden}) {
-      PetscCall(rowsAt(at, t + at, rows, variables, &X, &Y));
-      change = std::max(change, RelativeDifference(X, C0) + RelativeDifference(Y, K0));
+      PetscCall(rowsAt(at, t + at, rows, variables, &other));
+      change = std::max(change, RelativeDifference(other.C, start.C) + RelativeDifference(other.K, start.K));
     }
     if (change >= difference_step) break;
     e *= step_ratio;
@@ -239,19 +240,19 @@ PetscErrorCode Linearization::Work::ratesInTime(double e, bool at_rest, const st
 
 PetscErrorCode Linearization::Work::rates(const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
 {
-  Eigen::MatrixXd C0, K0, X, Y;
-  double          rate;
-  bool            of_time = false;
-  PetscInt        n;
+  RowValues start, other;
+  double    rate;
+  bool      of_time = false;
+  PetscInt  n;
   PetscFunctionBegin;
   PetscCall(MatGetSize(K, &n, nullptr));
-  for (Eigen::MatrixXd *x : {&out->C, &out->K, &out->second_K}) *x = Eigen::MatrixXd::Zero((Eigen::Index)rows.size(), n);
+  out->setZero((Eigen::Index)rows.size(), n);
   if (rows.empty()) PetscFunctionReturn(0); /* of any rank */
-  PetscCall(rowsAt(0, t, rows, variables, &C0, &K0));
+  PetscCall(rowsAt(0, t, rows, variables, &start));
   for (double later : {difference_step, difference_step / golden}) {
     if (of_time) break;
-    PetscCall(rowsAt(0, t + later, rows, variables, &X, &Y));
-    of_time = X != C0 || Y != K0;
+    PetscCall(rowsAt(0, t + later, rows, variables, &other));
+    of_time = other.C != start.C || other.K != start.K;
   }
   PetscCall(characteristicRate(&rate));
   if (of_time) PetscCall(ratesInTime(rate > 0 ? std::max(difference_step, difference_step / rate) : difference_step, !(rate > 0), rows, variables, out));

@@ -310,6 +310,77 @@ TEST(Linearize, ASliderCrankAtSpeed)
   }
 }
 
+/* The same where the axis of a wheel turns in space: a bevel wheel on a carrier, which rolls on a wheel of the ground, with inertia that depends on its attitude */
+TEST(Linearize, AWheelWhoseAxisTurns)
+{
+  constexpr double r = 0.1, rp = 0.05, mass = 0.5, carrier = 0.05, stiffness = 20, angle = 0.3;
+  for (const Vector3 &P : {Vector3(1e-3, 2e-3, 1e-3), Vector3(2e-3, 2e-3, 3.5e-3)})
+    for (double speed : {0., 20., 50.}) {
+      const double psi = angle * r / rp, ratio = r / rp; /* the carrier's angle, the planet's on it; the planet's moment about the carrier's axis changes with psi */
+      const double J = carrier + mass * r * r + P(1) * ratio * ratio + P(0) * std::cos(psi) * std::cos(psi) + P(2) * std::sin(psi) * std::sin(psi);
+      const double slope = (P(2) - P(0)) * std::sin(2 * psi) * ratio, expected = -(stiffness - stiffness * angle * slope / (2 * J)) / J;
+      const Matrix3 A = Eigen::AngleAxisd(angle, Vector3::UnitX()).toRotationMatrix(), X = axesAlong({1, 0, 0});
+      Scene         scene(PETSC_COMM_SELF);
+      RigidBody     c = body(2, {carrier, 0.05, 0.05}), p = body(mass, P, A * Vector3(0, r, 0));
+      c.rotation         = A;
+      c.angular_velocity = {speed, 0, 0};
+      p.rotation         = A * Eigen::AngleAxisd(-psi, Vector3::UnitY()).toRotationMatrix();
+      p.angular_velocity = A * Vector3(speed, -ratio * speed, 0);
+      p.velocity         = c.angular_velocity.cross(p.position);
+      const Body   arm = scene.add("carrier", c), wheel = scene.add("planet", p);
+      const Marker ground = scene.marker(scene.ground(), {0, 0, 0}, X), hub = scene.marker(arm, {0, 0, 0}, X);
+      const Marker on_arm = scene.marker(arm, {0, r, 0}, axesAlong({0, 1, 0})), on_wheel = scene.marker(wheel, {0, 0, 0}, axesAlong({0, 1, 0}));
+      scene.add("main", Revolute{hub, ground});
+      scene.add("pin", Revolute{on_wheel, on_arm});
+      scene.add("mesh", hhtdae::GearMesh{ground, hub, on_wheel, on_arm, scene.marker(arm, {-rp, r, 0}, axesAlong({0, 0, 1}))});
+      scene.add("spring", TorsionalSpringDamper{hub, ground, stiffness, 0, 0});
+      const Started start(scene);
+      for (const Body axes : {Body{}, arm, wheel}) {
+        Linearization     small;
+        std::vector<Mode> modes;
+        must(small.take(start.run.ts, 0, axes));
+        must(small.modes(&modes));
+        for (const Mode &mode : modes) EXPECT_LT(std::abs(mode.value * mode.value - expected), 1e-6 * std::abs(expected)) << speed << " " << mode.value << " " << expected;
+      }
+    }
+}
+
+/* Flap and pitch of a hinged blade on a driven hub, by the moments that turn it back, from whatever axes */
+TEST(Linearize, AHingedBladeOnADrivenHub)
+{
+  constexpr double mass = 50, L = 5, e = 0.25, speed = 30, spring = 2000, I = 0.4;
+  const double     across = mass * L * L / 12;
+  for (bool flap : {true, false}) {
+    const Vector3 hinge = flap ? Vector3(0, -1, 0) : Vector3(1, 0, 0);
+    const double  at_hinge = across + mass * L * L / 4;
+    const double  square = flap ? (spring + speed * speed * (at_hinge - 0.1 * I + mass * L / 2 * e)) / (at_hinge + 0.1 * I) : (spring + speed * speed * 0.8 * I) / I;
+    Scene         scene(PETSC_COMM_SELF);
+    RigidBody     h = body(1, {1, 1, 1}), b = body(mass, {I, across + 0.1 * I, across + 0.9 * I}, {e + L / 2, 0, 0});
+    h.angular_velocity = b.angular_velocity = {0, 0, speed};
+    b.velocity                              = h.angular_velocity.cross(b.position);
+    const Body   hub = scene.add("hub", h), blade = scene.add("blade", b);
+    const Marker axis = scene.marker(hub), ground = scene.marker(scene.ground());
+    const Marker i = scene.marker(blade, {-L / 2, 0, 0}, axesAlong(hinge)), j = scene.marker(hub, {e, 0, 0}, axesAlong(hinge));
+    scene.add("bearing", Revolute{axis, ground});
+    scene.add("drive", RotationalMotion{axis, ground, TimeFunction::polynomial({0, speed})});
+    scene.add("hinge", Revolute{i, j});
+    scene.add("spring", TorsionalSpringDamper{i, j, spring, 0, 0});
+    const Started start(scene);
+    for (const Body axes : {Body{}, hub, blade}) {
+      Linearization     small;
+      std::vector<Mode> modes;
+      StateSpace        space;
+      must(small.take(start.run.ts, 0, axes));
+      must(small.modes(&modes));
+      for (const Mode &mode : modes) EXPECT_LT(std::abs(mode.value * mode.value + square), 1e-6 * square) << flap << " " << mode.value << " " << std::sqrt(square);
+      must(small.stateSpace({Excitation::torque(i, hinge)}, {Measure::angle(i, j)}, &space));
+      EXPECT_NEAR(space.C[0] * space.B[0] + space.C[1] * space.B[1], 0, 1e-9);
+      const double static_angle = -(space.C[0] * space.B[1] / space.A[2]); /* z' = y, y' = A z + B: the angle of a moment of 1 */
+      EXPECT_NEAR(std::abs(static_angle) * square * (flap ? at_hinge + 0.1 * I : I), 1, 1e-6);
+    }
+  }
+}
+
 namespace
 {
 
