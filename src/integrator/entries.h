@@ -62,6 +62,27 @@ PetscErrorCode ForEntries(F f, First first, Rest... rest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether something is so on any rank, or on all of them; object: whose ranks */
+template <class Object>
+PetscErrorCode OnAnyRank(Object object, bool here, bool *any)
+{
+  PetscMPIInt yes = here;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &yes, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)object)));
+  *any = yes;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+template <class Object>
+PetscErrorCode OnAllRanks(Object object, bool here, bool *all)
+{
+  PetscFunctionBegin;
+  PetscCall(OnAnyRank(object, !here, all));
+  *all = !*all;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* *first: the smallest global index, over all ranks, of an entry for which f(i, x_i, ...) is true; -1 if there is none */
 template <class F, class First, class... Rest>
 PetscErrorCode FirstWhere(F f, PetscInt *first, First a, Rest... rest)
@@ -73,6 +94,18 @@ PetscErrorCode FirstWhere(F f, PetscInt *first, First a, Rest... rest)
   PetscCall(ForEntries([&](PetscInt i, auto... x) { if (mine == HHT3_INT_MAX && f(i, x...)) mine = start + i; }, a, rest...));
   PetscCallMPI(MPI_Allreduce(&mine, first, 1, MPIU_INT, MPI_MIN, PetscObjectComm((PetscObject)a.vec)));
   if (*first == HHT3_INT_MAX) *first = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The largest f(i, x_i, ...) over the entries of all ranks, at least 0 */
+template <class F, class First, class... Rest>
+PetscErrorCode LargestOf(F f, PetscReal *largest, First a, Rest... rest)
+{
+  PetscReal most = 0;
+
+  PetscFunctionBegin;
+  PetscCall(ForEntries([&](PetscInt i, auto... x) { most = PetscMax(most, f(i, x...)); }, a, rest...));
+  PetscCallMPI(MPI_Allreduce(&most, largest, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)a.vec)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -322,6 +322,18 @@ struct Integrator : StepState {
   PetscReal        progress_last = 0;
 };
 
+/* f(state) for all that changes in the course of a run */
+template <class F>
+void ForStates(Integrator &I, F f)
+{
+  f(static_cast<StepState &>(I));
+  f(static_cast<CorrectorState &>(I.corrector));
+  f(static_cast<PredictorState &>(I.predictor));
+  f(static_cast<OrderState &>(I.order));
+  f(static_cast<ChangeState &>(I.change));
+  f(static_cast<VerificationState &>(I.verify));
+}
+
 inline Integrator &Get(TS ts) { return *static_cast<Integrator *>(ts->data); }
 
 /* (t + tau) - t with t + tau rounded, and never 0. Functions of time are evaluated at the rounded time, so that their differences have to be

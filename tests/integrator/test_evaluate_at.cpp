@@ -318,8 +318,9 @@ TEST(EvaluateAt, BesideAProductOfTheApplication)
 TEST(EvaluateAt, PreconditionersWithParts)
 {
   const DoublePendulum p(1.);
-  for (PCType type : {PCCOMPOSITE, PCFIELDSPLIT}) {
-    const auto options = tolerance(1e-6) + "-ksp_type gmres -ksp_rtol 1e-12 -fieldsplit_all_pc_type svd";
+  const std::pair<PCType, const char *> types[] = {{PCCOMPOSITE, ""}, {PCFIELDSPLIT, ""}, {PCCOMPOSITE, " -pc_type composite"}, {PCFIELDSPLIT, " -pc_type fieldsplit"}};
+  for (const auto &[type, named] : types) {
+    const auto options = tolerance(1e-6) + "-ksp_type gmres -ksp_rtol 1e-12 -fieldsplit_all_pc_type svd" + named;
     Simulation run(p, options);
     Sample     x(run.U);
     SNES       snes;

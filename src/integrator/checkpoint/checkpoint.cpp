@@ -11,6 +11,7 @@
 #include "integrator/coordinates/change.h"
 #include "checkpoint.h"
 #include "checkpoint_parts.h"
+#include "integrator/entries.h"
 #include "integrator/step/step.h"
 #include "integrator/work_vec.h"
 
@@ -38,13 +39,8 @@ void TransferStructs(TS ts, Archive &a)
   Integrator &I = Get(ts);
 
   TransferNumbers(ts, a);
-  a.plain(static_cast<StepState &>(I));
-  a.plain(static_cast<CorrectorState &>(I.corrector));
-  a.plain(static_cast<PredictorState &>(I.predictor));
-  a.plain(static_cast<OrderState &>(I.order));
+  ForStates(I, [&](auto &state) { a.plain(state); });
   a.plain(I.p);
-  a.plain(static_cast<ChangeState &>(I.change));
-  a.plain(static_cast<VerificationState &>(I.verify));
 }
 
 PetscErrorCode TransferVec(TS ts, Archive &a, Vec *x)
@@ -112,38 +108,44 @@ PetscErrorCode GatherRun(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What has been read so far had the sizes that it has here */
+PetscErrorCode CheckBuild(TS ts, const char file[], const Archive &a)
+{
+  bool good;
+
+  PetscFunctionBegin;
+  PetscCall(OnAllRanks(ts, a.good, &good));
+  PetscCheck(good, PetscObjectComm((PetscObject)ts), PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode RestoreRun(TS ts, const char file[], Archive &a)
 {
   Integrator       &I    = Get(ts);
-  MPI_Comm          comm = PetscObjectComm((PetscObject)ts);
   Identity          id;
   std::string       options;
   std::vector<char> words;
   WorkVec           was, is;
-  bool              good;
 
   PetscFunctionBegin;
   a.plain(id);
   a.list(words);
-  PetscCall(Everywhere(ts, a.good, &good));
-  PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  PetscCall(CheckBuild(ts, file, a));
   PetscCall(CheckIdentity(ts, file, id));
   TransferStructs(ts, a);
-  PetscCall(Everywhere(ts, a.good, &good));
-  PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  PetscCall(CheckBuild(ts, file, a));
   PetscCall(was.like(ts->vec_sol));
   PetscCall(is.like(ts->vec_sol));
   PetscCall(TransferVectors(ts, a));
   Vec of_file = was;
   PetscCall(TransferVec(ts, a, &of_file));
-  PetscCall(Everywhere(ts, a.good, &good));
-  PetscCheck(good, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written by another build of this library", file);
+  PetscCall(CheckBuild(ts, file, a));
   I.stage_id = 0;
   PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
   PetscCall(OptionsInWords(ts, &options));
   const std::string theirs(words.begin(), words.end());
   if (theirs != options) /* the user's right, but then the run is another one */
-    PetscCall(PetscPrintf(comm, "hhtdae: the run that wrote %s had other options, and this one will not repeat its steps:\n  there %s\n  here  %s\n", file, theirs.c_str(), options.c_str()));
+    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "hhtdae: the run that wrote %s had other options, and this one will not repeat its steps:\n  there %s\n  here  %s\n", file, theirs.c_str(), options.c_str()));
   PetscCall(TellingResidual(ts, is));
   PetscCall(CheckTellingResidual(ts, file, was, is));
   PetscCall(LoadMatrices(ts, a));
@@ -167,7 +169,6 @@ PetscErrorCode CheckpointSave(TS ts, const char file[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before the set-up it is only noted, and read at its end */
 PetscErrorCode CheckpointLoad(TS ts, const char file[])
 {
   Integrator &I = Get(ts);

@@ -21,7 +21,7 @@ struct Header {
 };
 
 constexpr char         magic[8] = {'h', 'h', 't', 'd', 'a', 'e', 'c', 'p'};
-constexpr std::int32_t version  = 15;
+constexpr std::int32_t version  = 16;
 
 /* Files of versions 1 to 3 began with this number and their version, big-endian */
 constexpr unsigned char old_magic[4] = {0x00, 0x12, 0x7b, 0xaa};
@@ -87,7 +87,7 @@ PetscErrorCode WriteAll(MPI_Comm comm, const std::vector<std::uint64_t> &sizes, 
   if (rank) {
     for (size_t at = 0; at < mine.size(); at += message)
       PetscCallMPI(MPI_Send(mine.data() + at, (int)PetscMin(message, mine.size() - at), MPI_CHAR, 0, 0, comm));
-    PetscFunctionReturn(0);
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
   out.write(mine.data(), mine.size());
   for (size_t r = 1; r < sizes.size(); r++)
@@ -96,7 +96,7 @@ PetscErrorCode WriteAll(MPI_Comm comm, const std::vector<std::uint64_t> &sizes, 
       PetscCallMPI(MPI_Recv(buffer.data(), (int)buffer.size(), MPI_CHAR, (int)r, 0, comm, MPI_STATUS_IGNORE));
       out.write(buffer.data(), buffer.size());
     }
-  PetscFunctionReturn(0);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode ReadAll(MPI_Comm comm, const std::vector<std::uint64_t> &sizes, std::vector<char> &mine, Stream &in)
@@ -112,7 +112,7 @@ PetscErrorCode ReadAll(MPI_Comm comm, const std::vector<std::uint64_t> &sizes, s
   if (rank) {
     for (size_t at = 0; at < size; at += message)
       PetscCallMPI(MPI_Recv(mine.data() + at, (int)PetscMin(message, size - at), MPI_CHAR, 0, 0, comm, MPI_STATUS_IGNORE));
-    PetscFunctionReturn(0);
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
   in.read(mine.data(), size);
   for (size_t r = 1; r < sizes.size(); r++)
@@ -121,7 +121,7 @@ PetscErrorCode ReadAll(MPI_Comm comm, const std::vector<std::uint64_t> &sizes, s
       in.read(buffer.data(), buffer.size());
       PetscCallMPI(MPI_Send(buffer.data(), (int)buffer.size(), MPI_CHAR, (int)r, 0, comm));
     }
-  PetscFunctionReturn(0);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What rank 0 has found out about a file before anybody gets anything from it */
@@ -201,7 +201,7 @@ PetscErrorCode CheckpointFileWrite(MPI_Comm comm, const std::string &file, const
   PetscCallMPI(MPI_Bcast(&out.error, 1, MPI_INT, 0, comm));
   PetscCheck(!out.error, comm, PETSC_ERR_FILE_WRITE, "Cannot write the checkpoint %s: %s", file.c_str(),
              out.error == EINVAL ? "it exists and is not a regular file" : std::strerror(out.error));
-  PetscFunctionReturn(0);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode CheckpointFileCheck(MPI_Comm comm, const std::string &file)
@@ -222,7 +222,7 @@ PetscErrorCode CheckpointFileCheck(MPI_Comm comm, const std::string &file)
   PetscCallMPI(MPI_Bcast(&error, 1, MPI_INT, 0, comm));
   PetscCheck(!error, comm, PETSC_ERR_FILE_OPEN, "No checkpoint can be written to %s (-ts_hhtdae_checkpoint): %s %s", file.c_str(), error == EINVAL ? "it" : ("directory " + dir + ":").c_str(),
              error == EINVAL ? "exists and is not a regular file" : std::strerror(error));
-  PetscFunctionReturn(0);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode CheckpointFileRead(MPI_Comm comm, const std::string &file, std::vector<char> &mine)
@@ -257,7 +257,7 @@ PetscErrorCode CheckpointFileRead(MPI_Comm comm, const std::string &file, std::v
   if (in.f) std::fclose(in.f);
   PetscCallMPI(MPI_Bcast(&in.error, 1, MPI_INT, 0, comm));
   PetscCheck(!in.error, comm, PETSC_ERR_FILE_READ, "Cannot read the checkpoint %s: %s", file.c_str(), std::strerror(in.error));
-  PetscFunctionReturn(0);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 } // namespace hht3

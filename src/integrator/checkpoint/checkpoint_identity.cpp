@@ -41,16 +41,6 @@ PetscErrorCode IdentifyRun(TS ts, Identity *id)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode Everywhere(TS ts, bool mine, bool *all)
-{
-  int both = mine;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &both, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  *all = both;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was)
 {
   Identity   is;
@@ -65,10 +55,10 @@ PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was)
              "Checkpoint %s was written with form %s and alpha_f = %g, the run has %s and %g: give the same options", file, form(was.form), (double)was.p.af,
              form(is.form), (double)is.p.af);
   PetscCheck(was.order == is.order, comm, PETSC_ERR_FILE_UNEXPECTED, "Checkpoint %s was written with order up to %" PetscInt_FMT ", the run has %" PetscInt_FMT ": give the same -ts_hhtdae_order", file, was.order, is.order);
-  PetscCall(Everywhere(ts, was.n == is.n && was.roles == is.roles, &same));
+  PetscCall(OnAllRanks(ts, was.n == is.n && was.roles == is.roles, &same));
   PetscCheck(same, comm, PETSC_ERR_FILE_UNEXPECTED,
              "Checkpoint %s belongs to another problem: its unknowns have other roles, or are divided among the ranks in another way", file);
-  PetscCall(Everywhere(ts, was.extra == is.extra && was.extra_n == is.extra_n, &same));
+  PetscCall(OnAllRanks(ts, was.extra == is.extra && was.extra_n == is.extra_n, &same));
   PetscCheck(same, comm, PETSC_ERR_FILE_UNEXPECTED,
              "Checkpoint %s has %" PetscInt_FMT " entries of the application's own, the run expects %" PetscInt_FMT ", or has them on other ranks: give TSHHT3SetCheckpointVec() the vector of the run that wrote it",
              file, was.extra, is.extra);
@@ -122,14 +112,13 @@ PetscErrorCode TellingResidual(TS ts, Vec F)
 
 PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is)
 {
-  PetscReal   scale = 0;
+  PetscReal   scale;
   PetscScalar there, here;
   PetscInt    row;
   RowLabel    label;
 
   PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt, PetscScalar x) { if (!PetscIsInfOrNanScalar(x)) scale = PetscMax(scale, PetscAbsScalar(x)); }, Read(was)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &scale, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscCall(LargestOf([](PetscInt, PetscScalar x) { return PetscIsInfOrNanScalar(x) ? 0 : PetscAbsScalar(x); }, &scale, Read(was)));
   PetscCall(FirstWhere(
     [=](PetscInt, PetscScalar x, PetscScalar y) { return !(PetscIsInfOrNanScalar(x) && PetscIsInfOrNanScalar(y)) && !(PetscAbsScalar(x - y) <= residual_mismatch * scale); }, &row,
     Read(was), Read(is)));

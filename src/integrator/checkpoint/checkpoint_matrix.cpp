@@ -3,6 +3,7 @@
   may have gone on since: it may have taken other coordinates, or remember more. Only its pattern has to be there, and that takes an evaluation.
 */
 #include "checkpoint_parts.h"
+#include "integrator/entries.h"
 #include "integrator/equations/equations.h"
 #include "integrator/equations/jacobian.h"
 #include "integrator/start/consistent.h"
@@ -50,10 +51,8 @@ PetscErrorCode LoadRows(TS ts, Mat A, Archive &a, bool *good)
   PetscCall(LocalValues(A, false, now, col, offset));
   a.plain(pattern);
   a.list(values);
-  int same = a.good && values.size() == now.size() && pattern == PatternHash(col, offset);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_MIN, PetscObjectComm((PetscObject)ts)));
-  *good = same;
-  if (same) PetscCall(SetLocalValues(A, values, col, offset));
+  PetscCall(OnAllRanks(ts, a.good && values.size() == now.size() && pattern == PatternHash(col, offset), good));
+  if (*good) PetscCall(SetLocalValues(A, values, col, offset));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,7 +78,7 @@ PetscErrorCode ReadMatrixState(TS ts, Archive &a, MatrixState *m)
 
   PetscFunctionBegin;
   a.plain(*m);
-  PetscCall(Everywhere(ts, a.good, &good));
+  PetscCall(OnAllRanks(ts, a.good, &good));
   if (!good) *m = MatrixState{};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

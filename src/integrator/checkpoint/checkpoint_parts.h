@@ -28,9 +28,6 @@ PetscErrorCode OptionsInWords(TS ts, std::string *text);
 PetscErrorCode TellingResidual(TS ts, Vec F);
 PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is);
 
-/* An answer for all ranks */
-PetscErrorCode Everywhere(TS ts, bool mine, bool *all);
-
 /* Where they cannot be restored the run makes new ones */
 PetscErrorCode SaveMatrices(TS ts, Archive &a);
 PetscErrorCode LoadMatrices(TS ts, Archive &a);

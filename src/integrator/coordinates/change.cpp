@@ -74,7 +74,6 @@ PetscErrorCode CommitChange(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Changes the coordinates at t_n if the application asks for it: before a consistent start, or before a step from U0, V0 */
 PetscErrorCode ChangeCoordinates(TS ts, bool starting)
 {
   Integrator &I = Get(ts);

@@ -164,7 +164,6 @@ PetscErrorCode MapJerk(TS ts, const Motion &m, Mapping &map)
   if (!I.normal_jerk) PetscCall(VecDuplicate(I.U0, &I.normal_jerk));
   PetscCall(jerk.like(I.U0));
   PetscCall(VecZeroEntries(I.normal_jerk));
-  PetscCall(VecZeroEntries(jerk));
   for (int sign = -1; sign <= 1; sign += 2) {
     PetscCall(At(I, m, sign * d, map.old));
     PetscCall(MapAt(ts, map, sign * d));

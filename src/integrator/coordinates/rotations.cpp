@@ -159,7 +159,6 @@ static PetscErrorCode ReferPast(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the attitudes of U0 the reference, and copies U0 to vec_sol */
 PetscErrorCode ReferToState(TS ts)
 {
   Integrator &I = Get(ts);

@@ -248,7 +248,6 @@ PetscErrorCode RowBeside(TS ts, Mat ones, IS color, int half, const WorkVec (&x)
   for (WorkVec *v : {&mark, &F, &places}) PetscCall(v->like(F0));
   PetscCall(ISGetLocalSize(color, &n));
   PetscCall(ISGetIndices(color, &index));
-  PetscCall(VecZeroEntries(mark));
   for (PetscInt k = 0; k < n; k++)
     if (InHalf(index[k], half)) PetscCall(VecSetValue(mark, index[k], 1 + index[k] % 1000 * 7919 % 13, INSERT_VALUES)); /* what they do shall not cancel */
   PetscCall(ISRestoreIndices(color, &index));
@@ -320,24 +319,22 @@ constexpr PetscReal largest_size       = 1e16;
 PetscErrorCode TrySize(TS ts, const WorkVec (&x)[3], PetscReal size, Vec F0, Vec A, Vec F, bool *enough, bool *finite)
 {
   const PetscReal step   = relative_step[2] * size;
-  PetscReal       change = 0, max;
-  PetscInt        more   = 0;
+  PetscReal       max;
+  bool            hidden = false;
 
   PetscFunctionBegin;
   PetscCall(VecCopy(x[2], A));
   PetscCall(ForEntries([&](PetscInt, PetscScalar &a) { a += step; }, Write(A)));
   PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], A, F));
-  PetscCall(ForEntries([&](PetscInt, PetscScalar f0, PetscScalar f) { change = PetscIsInfOrNanScalar(f - f0) ? PETSC_MAX_REAL : PetscMax(change, PetscAbsScalar(f - f0)); }, Read(F0), Read(F)));
-  PetscCallMPI(MPI_Allreduce(&change, &max, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscCall(LargestOf([](PetscInt, PetscScalar f0, PetscScalar f) { return PetscIsInfOrNanScalar(f - f0) ? PETSC_MAX_REAL : PetscAbsScalar(f - f0); }, &max, Read(F0), Read(F)));
   *finite = max < PETSC_MAX_REAL;
   PetscCall(ForEntries(
     [&](PetscInt, PetscScalar f0, PetscScalar f) {
       const PetscReal d = PetscAbsScalar(f - f0), size0 = PetscAbsScalar(f0);
-      if (d < visible_change * size0 && (d > row_rounding * size0 ? d > negligible_inertia * max : PETSC_MACHINE_EPSILON * size0 > hidden_inertia * max)) more = 1;
+      if (d < visible_change * size0 && (d > row_rounding * size0 ? d > negligible_inertia * max : PETSC_MACHINE_EPSILON * size0 > hidden_inertia * max)) hidden = true;
     },
     Read(F0), Read(F)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &more, 1, MPIU_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
-  *enough = !more;
+  PetscCall(OnAllRanks(ts, !hidden, enough));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -371,7 +368,6 @@ PetscErrorCode SizeOfAccelerations(TS ts, Differences *d)
 
 } // namespace
 
-/* *P: the matrix to use, or NULL to have one made */
 PetscErrorCode DifferencesCreate(TS ts, Mat *P)
 {
   Integrator  &I = Get(ts);

@@ -55,7 +55,6 @@ PetscErrorCode MatrixHasNumbers(Mat P, PetscBool *numbers)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the user chose none, once the matrix has its first values, and again if it ceases to be symmetric */
 PetscErrorCode ChooseSolver(KSP ksp, Mat P, LinearState *linear)
 {
   PetscBool symmetric, numbers = PETSC_TRUE; /* NaN is not symmetric, but no reason to choose another solver */
@@ -110,7 +109,6 @@ static PetscErrorCode TakeTolerance(TS ts, KSP ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* linear->failed: of the last factorization on entry, of this one on return */
 PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearState *linear)
 {
   PC        pc;
@@ -139,7 +137,6 @@ PetscErrorCode Factor(TS ts, KSP ksp, Mat J, Mat P, LinearState *linear)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a solve by the run's solver; *other: another one takes its place, which has no factor yet */
 PetscErrorCode GiveUpKrylov(TS ts, PetscBool *other)
 {
   KSP ksp;
@@ -229,7 +226,6 @@ PetscErrorCode ExplainLinearFailure(TS ts, PetscReal t, PetscReal h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x from the matrix and the solver of the run, which makes a factor where it has none. ok: it is a solution */
 PetscErrorCode SolveOfTheRun(TS ts, Vec b, Vec x, PetscBool *ok)
 {
   KSP                ksp;

@@ -109,7 +109,6 @@ PetscErrorCode GivesRows(Mat A, PetscBool *yes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Values of the local rows, one after another, and for each its global column; of one triangle from the diagonal on */
 PetscErrorCode LocalValues(Mat P, bool triangle, std::vector<PetscScalar> &val, std::vector<PetscInt> &col, std::vector<PetscInt> &offset)
 {
   PetscInt           start, end, nc;

@@ -1,4 +1,5 @@
 /* Which unknowns belong to the nodes of finite elements, for the preconditioner "hhtconstraint" (src/linear/constraint.h) */
+#include "integrator/entries.h"
 #include "linear/constraint.h"
 #include "solver.h"
 
@@ -9,15 +10,14 @@ constexpr char reference_name[] = "hhtdae_reference"; /* on the matrix: what TSH
 
 PetscErrorCode CheckReference(TS ts, Mat P, IS nodes, Vec reference)
 {
-  PetscInt  rows, n, size = 3;
-  PetscBool same;
+  PetscInt rows, n, size = 3;
+  bool     same;
 
   PetscFunctionBegin;
   PetscCall(MatGetLocalSize(P, &rows, NULL));
   PetscCall(VecGetLocalSize(reference, &n));
   if (nodes) PetscCall(ISGetBlockSize(nodes, &size));
-  same = (PetscBool)(n == rows && size == 3);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)ts)));
+  PetscCall(hht3::OnAllRanks(ts, n == rows && size == 3, &same));
   PetscCheck(same, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_SIZ, "TSHHT3SetNodes(): positions need nodes of three unknowns, and a vector of the layout of the solution");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -82,7 +82,6 @@ PetscErrorCode TSHHT3SetNodes(TS ts, IS nodes, Vec reference)
 namespace hht3
 {
 
-/* The matrix P has been evaluated at U: positions of its nodes, where they are asked for */
 PetscErrorCode TellPositions(Mat P, Vec U)
 {
   Vec reference, positions;
@@ -100,7 +99,6 @@ PetscErrorCode TellPositions(Mat P, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What TSHHT3SetNodes() has told of the rows of one matrix, for another one of the same rows */
 PetscErrorCode CopyNodes(Mat from, Mat to)
 {
   PetscObject told;

@@ -65,7 +65,6 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
   PetscCall(LocalValues(P, probe.triangle, two, col2, offset2));
   PetscCheck(col == col2, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG, "The nonzero pattern of the Jacobian changes from call to call; insert explicit zeros, or set the roles by TSHHT3SetIS()");
   PetscCall(mark.like(U));
-  PetscCall(VecZeroEntries(mark));
   PetscCall(VecGetOwnershipRange(U, &start, NULL));
   for (size_t i = 0; i < row_flag.size(); i++) {
     PetscReal least = 0;
@@ -97,7 +96,6 @@ PetscErrorCode ProbeState(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, Probe &probe
   PetscCall(LocalValues(P, probe.triangle, val, col, offset));
   PetscCall(VecGetOwnershipRange(U, &start, NULL));
   PetscCall(mark.like(U));
-  PetscCall(VecZeroEntries(mark));
   for (size_t i = 0; i < probe.row_u.size(); i++)
     for (PetscInt k = offset[i]; k < offset[i + 1]; k++) {
       if (val[k] == (PetscScalar)0) continue;

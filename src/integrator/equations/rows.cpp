@@ -109,7 +109,6 @@ PetscErrorCode RefuseNoNumbers(TS ts, Mat P)
   PetscFunctionBegin;
   PetscCall(A.like(I.X));
   PetscCall(F.like(I.X));
-  PetscCall(VecZeroEntries(A));
   PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, A, F));
   PetscCall(FirstBad(F, &row));
   if (row >= 0) PetscCall(NameBadRow(ts, ts->ptime, F));

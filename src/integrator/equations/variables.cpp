@@ -165,7 +165,6 @@ PetscErrorCode CheckSweeps(TS ts, Dependence &d)
 
 } // namespace
 
-/* After the roles are known */
 PetscErrorCode CheckDependence(TS ts)
 {
   Integrator            &I     = Get(ts);
@@ -199,24 +198,23 @@ PetscErrorCode CheckDependence(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual at a place along the motion, where variables that stand in constraints follow their definitions V - v(...) = 0 in U */
 PetscErrorCode ResidualAlong(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F)
 {
   Integrator &I = Get(ts);
-  PetscBool   moved;
+  bool        moved;
 
   PetscFunctionBegin;
   PetscCall(EvaluateResidual(ts, t, U, V, A, F));
   for (int sweep = 0; I.follow && sweep < max_sweeps; sweep++) {
-    moved = PETSC_FALSE;
+    moved = false;
     PetscCall(ForEntries(
       [&](PetscInt i, PetscScalar &u, PetscScalar f) {
         if (!IsDefined(I, i) || !(PetscAbsScalar(f) > 2 * PETSC_MACHINE_EPSILON * PetscAbsScalar(u))) return;
         u -= f;
-        moved = PETSC_TRUE;
+        moved = true;
       },
       Write(U), Read(F)));
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &moved, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
+    PetscCall(OnAnyRank(ts, moved, &moved));
     if (!moved) break;
     PetscCall(EvaluateResidual(ts, t, U, V, A, F));
   }

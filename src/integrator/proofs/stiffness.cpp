@@ -22,8 +22,6 @@ constexpr PetscReal rounding_of_sums   = 4 * PETSC_MACHINE_EPSILON; /* of a sum 
 
 } // namespace
 
-/* Whether corrections may be small although the residual is not: the matrix has large claims, or there are definitions, whose
-   stiffness does not show in its diagonal */
 bool MayHideForces(const Integrator &I) { return I.verify.largest >= stiffness_to_prove || (I.verify.largest > 0 && HasDefinitions(I)); }
 
 /* Computes claim_i of the matrix P with the present inertia, and the largest one */
@@ -73,7 +71,6 @@ PetscErrorCode NoteInertia(TS ts, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Called for every new matrix P of a step, made at X */
 PetscErrorCode NoteStiffness(TS ts, Vec X, Mat P)
 {
   Integrator   &I = Get(ts);

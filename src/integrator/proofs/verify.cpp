@@ -194,8 +194,6 @@ PetscErrorCode CompareAboveRounding(TS ts, Vec X, Vec F, PetscReal enough, Imbal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Called after the correction dX, which has led to X and would be the last one. F: the residual at X if `evaluated`; it is evaluated
-   here if needed. */
 PetscErrorCode VerifyCorrection(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated, PetscBool *proved)
 {
   Integrator   &I = Get(ts);

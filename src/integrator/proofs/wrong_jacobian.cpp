@@ -69,8 +69,6 @@ PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Called after an iteration that has failed with a matrix of its own: sets corrector.wrong_jacobian if the residual does not respond
-   to the last correction at all */
 PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
 {
   Integrator &I = Get(ts);

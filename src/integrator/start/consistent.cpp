@@ -45,7 +45,7 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
   KSPConvergedReason reason;
   PetscReal          d, x;
   PetscInt           its;
-  PetscMPIInt        failed;
+  bool               failed;
   PetscBool          unanswered = PETSC_FALSE;
 
   PetscFunctionBegin;
@@ -56,8 +56,7 @@ PetscErrorCode CorrectUnknowns(TS ts, Consistent &c, PetscReal *e, PetscBool *ok
   Get(ts).stat.newton++;
   c.its++;
   c.ksp_its += its;
-  failed = reason < 0;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscCall(OnAnyRank(ts, reason < 0, &failed));
   if (!failed) PetscCall(VecAXPY(c.X, -1, c.d));
   PetscCall(VecNorm(c.d, NORM_2, &d));
   PetscCall(VecNorm(c.X, NORM_2, &x));
@@ -129,7 +128,6 @@ PetscErrorCode ConsistentResidual(TS ts, Consistent &c)
 
 } // namespace
 
-/* U, V, A take X */
 PetscErrorCode TakeUnknowns(const Integrator &I, Consistent &c)
 {
   const PetscReal h = c.h;

@@ -66,8 +66,7 @@ PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes);
 /* A time over which the motion changes q by as much as its tolerance refers to; another one over which constraints are differentiated along it: project.cpp */
 PetscErrorCode TimeScale(TS ts, PetscReal *T);
 PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T);
-PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T);
-PetscErrorCode TimeScaleOfConstraints(TS ts, Vec V, PetscReal *T); /* of other velocities than those the step begins with */
+PetscErrorCode TimeScaleOfConstraints(TS ts, Vec V, PetscReal *T);
 PetscErrorCode RelativeRate(TS ts, Vec x, PetscReal *most); /* the largest of coordinates' rates or accelerations x, each by the coordinate's size */
 
 } // namespace hht3

@@ -65,17 +65,6 @@ struct Best {
   bool asksFor(PetscInt i, int l) const { return l == -1 ? level[i] == 1 : level[i] == l + 1; }
 };
 
-/* The largest of a vector's coordinates */
-PetscErrorCode LargestCoordinate(const Integrator &I, Vec U, PetscReal *largest)
-{
-  PetscReal most = 0;
-
-  PetscFunctionBegin;
-  PetscCall(ForEntries([&](PetscInt i, PetscScalar u) { if (IsCoordinate(I, i)) most = PetscMax(most, PetscAbsScalar(u)); }, Read(U)));
-  PetscCallMPI(MPI_Allreduce(&most, largest, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)U)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Which levels any row on any rank takes its derivative from, those of order 0 or 1 */
 PetscErrorCode LevelsInUse(TS ts, const Integrator &I, const Levels &levels, bool first, bool second, bool (&used)[longer_levels + max_levels])
 {
@@ -135,11 +124,11 @@ struct Path {
 
   PetscErrorCode create()
   {
+    const auto size = [&](PetscInt i, PetscScalar u) { return IsCoordinate(Get(ts), i) ? PetscAbsScalar(u) : 0; };
     PetscFunctionBegin;
     for (WorkVec *x : {&at, &F, &zero}) PetscCall(x->like(U));
-    PetscCall(VecZeroEntries(zero));
-    PetscCall(LargestCoordinate(Get(ts), U, &largest));
-    PetscCall(LargestCoordinate(Get(ts), V, &speed));
+    PetscCall(LargestOf(size, &largest, Read(U)));
+    PetscCall(LargestOf(size, &speed, Read(V)));
     PetscCall(VecCopy(U, at));
     PetscCall(rows(t, now));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -179,13 +168,13 @@ struct Path {
   PetscErrorCode differencesWhereNumbers(PetscReal tau, std::vector<PetscReal> &first, std::vector<PetscReal> &second, std::vector<PetscReal> &sign)
   {
     std::vector<PetscReal> s1, s2;
-    PetscBool              any, some = PETSC_FALSE;
+    bool                   any = false;
     PetscFunctionBegin;
     PetscCall(differences(tau, first, second));
     sign.assign(now.size(), 1);
     for (size_t i = 0; i < now.size(); i++)
-      if (IsConstraint(Get(ts), (PetscInt)i) && PetscIsInfOrNanReal(first[i])) some = PETSC_TRUE;
-    PetscCallMPI(MPI_Allreduce(&some, &any, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ts)));
+      if (IsConstraint(Get(ts), (PetscInt)i) && PetscIsInfOrNanReal(first[i])) any = true;
+    PetscCall(OnAnyRank(ts, any, &any));
     if (!any) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(differences(-tau, s1, s2));
     for (size_t i = 0; i < now.size(); i++) {
@@ -218,17 +207,17 @@ struct Path {
 
 /* Whether any row of any rank asks for a tau as long as that of level l < 0, what follows time is resolved by it, and none of what moves is moved further than the
    largest coordinate; the same on all ranks, those without unknowns too */
-PetscErrorCode IsLongerOf(const Path &along, const Best &d1, const Best &d2, int l, PetscReal tau, PetscBool *yes)
+PetscErrorCode IsLongerOf(const Path &along, const Best &d1, const Best &d2, int l, PetscReal tau, bool *yes)
 {
   const Integrator &I    = Get(along.ts);
-  PetscBool         asks = PETSC_FALSE;
+  bool              asks = false;
 
   PetscFunctionBegin;
-  *yes = PETSC_FALSE;
+  *yes = false;
   if (!(along.speed > 0) || (I.excitation && tau > I.fastest) || (points - 1) * tau * along.speed > along.largest) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < (PetscInt)I.role.size() && !asks; i++)
-    if (IsConstraint(I, i) && (d1.asksFor(i, l) || d2.asksFor(i, l))) asks = PETSC_TRUE;
-  PetscCallMPI(MPI_Allreduce(&asks, yes, 1, MPIU_BOOL, MPI_LOR, PetscObjectComm((PetscObject)along.ts)));
+    if (IsConstraint(I, i) && (d1.asksFor(i, l) || d2.asksFor(i, l))) asks = true;
+  PetscCall(OnAnyRank(along.ts, asks, yes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -236,7 +225,7 @@ PetscErrorCode IsLongerOf(const Path &along, const Best &d1, const Best &d2, int
 PetscErrorCode FindBest(Path &along, PetscReal T, const bool (&used)[longer_levels + max_levels], Best &d1, Best &d2)
 {
   const Integrator      &I = Get(along.ts);
-  PetscBool              more;
+  bool                   more;
   std::vector<PetscReal> s1, s2, sign, rounding(along.now.size(), 0);
 
   PetscFunctionBegin;
@@ -265,7 +254,6 @@ PetscErrorCode FindBest(Path &along, PetscReal T, const bool (&used)[longer_leve
 
 } // namespace
 
-/* Whether neither velocities nor time move what stands still */
 PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes)
 {
   PetscReal v;

@@ -176,7 +176,6 @@ PetscErrorCode SampleInside(TS ts, Sampler &S, PetscReal t, PetscBool *ok)
 
 } // namespace
 
-/* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
 PetscErrorCode EvaluateAt(TS ts, PetscReal t, Vec U, Vec V, Vec A)
 {
   Integrator &I  = Get(ts);
@@ -202,10 +201,10 @@ namespace
 {
 
 /* Whether positions, velocities or states are others than those of the last step at this time */
-PetscErrorCode SolutionWasSet(TS ts, PetscBool *set)
+PetscErrorCode SolutionWasSet(TS ts, bool *set)
 {
   Integrator &I     = Get(ts);
-  PetscMPIInt other = 0;
+  bool        other = false;
   WorkVec     U, V;
 
   PetscFunctionBegin;
@@ -214,12 +213,11 @@ PetscErrorCode SolutionWasSet(TS ts, PetscBool *set)
   PetscCall(Interpolate(ts, ts->ptime, U, V, NULL));
   PetscCall(ForEntries(
     [&](PetscInt i, PetscScalar u, PetscScalar v, PetscScalar x, PetscScalar y) {
-      if (IsDifferential(RoleOf(I, i)) && u != x) other = 1;
-      if (IsCoordinate(I, i) && v != y) other = 1;
+      if (IsDifferential(RoleOf(I, i)) && u != x) other = true;
+      if (IsCoordinate(I, i) && v != y) other = true;
     },
     Read(ts->vec_sol), Read(ts->vec_dot), Read(U), Read(V)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &other, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)ts)));
-  *set = other ? PETSC_TRUE : PETSC_FALSE;
+  PetscCall(OnAnyRank(ts, other, set));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -249,7 +247,8 @@ PetscErrorCode EvaluatePresent(TS ts, PetscBool changed, Vec U, Vec V, Vec A, Pe
   const bool      begin  = IsBeginOfStep(ts, t);
   const bool      within = begin || (I.have_step && t >= I.t0 && t <= I.t1);
   Sampler        *S      = NULL;
-  PetscBool       ok     = PETSC_FALSE, set = PETSC_FALSE;
+  PetscBool       ok     = PETSC_FALSE;
+  bool            set    = false;
   const char     *why    = "";
 
   PetscFunctionBegin;

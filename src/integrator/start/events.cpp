@@ -52,7 +52,6 @@ std::vector<Leaving> AtZero(TS ts, const std::vector<PetscScalar> &f0)
 
 } // namespace
 
-/* U0, V0, A0 hold a consistent start */
 PetscErrorCode LimitStepByEvents(TS ts)
 {
   std::vector<PetscScalar> f0, f;

@@ -92,7 +92,6 @@ PetscErrorCode FollowTime(TS ts, PetscReal stop, PetscReal of_ramps, Vec known, 
   PetscFunctionBegin;
   for (WorkVec *v : {&zero, &F[0], &F[1], &c.largest, &c.number}) PetscCall(v->like(I.U0));
   c.shortest = within;
-  for (Vec v : {(Vec)zero, (Vec)c.largest, (Vec)c.number}) PetscCall(VecZeroEntries(v));
   PetscCall(VecSet(within, PETSC_MAX_REAL));
   PetscCall(EvaluateResidual(ts, ts->ptime + first_sample * stop, I.U0, I.V0, zero, F[0]));
   PetscReal tau = first_sample * stop;
@@ -130,7 +129,6 @@ PetscErrorCode FindExcitation(TS ts)
   I.ahead = Ahead::Unknown;
   if (!ends) PetscCall(TimeScale(ts, &stop));
   PetscCall(before.like(I.U0));
-  PetscCall(VecZeroEntries(before));
   if (I.excitation && ts->ptime > I.t_begin) PetscCall(VecCopy(I.excitation, before));
   if (!I.excitation) PetscCall(VecDuplicate(I.U0, &I.excitation));
   PetscCall(FollowTime(ts, stop, ends ? ramp_time * stop : stop, before, I.excitation, &I.swing));
@@ -163,7 +161,6 @@ PetscErrorCode LookAhead(TS ts, PetscReal t, Vec U, Vec V)
   if (!(ts->max_time < PETSC_MAX_REAL / 2 && rest > 0)) PetscFunctionReturn(PETSC_SUCCESS); /* a run without end (Excitation.RunsWithoutEnd) */
   const int samples_ahead = (int)PetscMin(PetscCeilReal(most_samples * (rest / run)), most_samples);
   for (WorkVec *v : {&zero, &now, &then}) PetscCall(v->like(U));
-  PetscCall(VecZeroEntries(zero));
   PetscCall(EvaluateResidual(ts, t, U, V, zero, now));
   for (int sample = 0; sample < samples_ahead && !(change > 0); sample++) {
     part = part + first_sample < 1 ? part + first_sample : part + first_sample - 1;

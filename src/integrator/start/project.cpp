@@ -138,7 +138,7 @@ PetscErrorCode CheckVelocities(TS ts, bool project, Prepared *prepared, PetscRea
 
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
-  PetscCall(TimeScaleOfConstraints(ts, &along));
+  PetscCall(TimeScaleOfConstraints(ts, I.V0, &along));
   PetscCall(ConstraintDerivatives(ts, ts->ptime, I.U0, I.V0, along, &prepared->levels, I.work, I.gamma));
   PetscCall(SolveStart(ts, I.work, I.X));
   PetscCall(CoordinateNorm(ts, I.X, T, e));
@@ -178,15 +178,9 @@ PetscErrorCode RelativeRate(TS ts, Vec x, PetscReal *most)
 {
   Integrator     &I     = Get(ts);
   const PetscReal least = PetscMax(ts->rtol > 0 && !ts->vatol && !ts->vrtol ? ts->atol / ts->rtol : 1, 1e-8); /* coordinates whose size is less count as of this size */
-  PetscReal       local = 0;
 
   PetscFunctionBegin;
-  PetscCall(ForEntries(
-    [&](PetscInt i, PetscScalar v, PetscScalar y) {
-      if (IsCoordinate(I, i)) local = PetscMax(local, PetscAbsScalar(v) / PetscMax(PetscRealPart(y), least));
-    },
-    Read(x), Read(I.ymax)));
-  PetscCallMPI(MPI_Allreduce(&local, most, 1, MPIU_REAL, MPIU_MAX, PetscObjectComm((PetscObject)ts)));
+  PetscCall(LargestOf([&](PetscInt i, PetscScalar v, PetscScalar y) { return IsCoordinate(I, i) ? PetscAbsScalar(v) / PetscMax(PetscRealPart(y), least) : 0; }, most, Read(x), Read(I.ymax)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -222,7 +216,6 @@ PetscErrorCode TimeScaleOfConstraints(TS ts, Vec V, PetscReal *T)
   *T = TimeOf(ts, rate, longest_in_runs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-PetscErrorCode TimeScaleOfConstraints(TS ts, PetscReal *T) { return TimeScaleOfConstraints(ts, Get(ts).V0, T); }
 
 /* Whether the solution is what a step has left in t, U, V, but for less than the tolerance: after a roll-back, or where a post-step function has brought attitudes
    to length 1. What it misses of the constraints is not the application's (BetweenRuns.WhatAStepHasLeft). */
@@ -243,7 +236,6 @@ PetscErrorCode IsOwnState(TS ts, PetscReal t, Vec U, Vec V, PetscBool *own)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Measures, reports and by choice mends U0, V0. Of what the start needs of the final ones, `prepared` says what has been made. */
 PetscErrorCode CheckInitialState(TS ts, Prepared *prepared)
 {
   Integrator &I       = Get(ts);

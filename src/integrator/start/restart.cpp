@@ -35,8 +35,6 @@ PetscErrorCode RestartConsistently(TS ts)
   I.stat.restarts++;
   ResetOrder(ts);
   PetscCall(ProjectState(ts, &have));
-  PetscCall(VecCopy(I.U0, ts->vec_sol)); /* by less than the tolerance */
-  PetscCall(VecCopy(I.V0, ts->vec_dot));
   PetscCall(StartFromState(ts, have));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -54,7 +52,6 @@ static PetscErrorCode AreAccelerated(TS ts, PetscBool *yes)
 
   PetscFunctionBegin;
   for (WorkVec *v : {&U, &zero, &load, &F}) PetscCall(v->like(I.U0));
-  PetscCall(VecZeroEntries(zero));
   PetscCall(VecCopy(I.U0, U));
   PetscCall(ForEntries([&](PetscInt i, PetscScalar &u) { if (IsConstraint(I, i)) u = 0; }, Write(U)));
   PetscCall(EvaluateResidual(ts, ts->ptime, U, zero, zero, load));
@@ -83,7 +80,7 @@ static PetscErrorCode RoundingOfAccelerations(TS ts, PetscReal h, PetscReal *par
   PetscFunctionBegin;
   PetscCall(CorrectionNorm(ts, I.A0, 1, &e));
   PetscCall(TimeScale(ts, &run));
-  PetscCall(TimeScaleOfConstraints(ts, &motion));
+  PetscCall(TimeScaleOfConstraints(ts, I.V0, &motion));
   const PetscReal eps = PetscMax(ts->rtol, PETSC_SQRT_MACHINE_EPSILON), rounding = PETSC_MACHINE_EPSILON / ScalePosition(I.p, h);
   const PetscReal least = eps / PetscSqr(run), a = PetscMax(e / PetscAbsReal(I.p.k) * eps, eps / PetscSqr(motion));
   if (a < least && rounding > rounded_accelerations * a) PetscCall(AreAccelerated(ts, &there)); /* else it makes no difference */

@@ -148,7 +148,6 @@ PetscErrorCode TakeStartValues(Integrator &I)
 
 } // namespace
 
-/* U and V a time d after U0, V0 by Taylor series with the accelerations A0 */
 PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V)
 {
   PetscFunctionBegin;
@@ -198,7 +197,7 @@ PetscErrorCode SolveAt(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared &
   if (I.constraints()) {
     c.gamma  = I.gamma;
     c.levels = &have.levels;
-    PetscCall(TimeScaleOfConstraints(ts, &c.T));
+    PetscCall(TimeScaleOfConstraints(ts, I.V0, &c.T));
     if (!have.gamma) PetscCall(ConstraintDerivatives(ts, t, c.U, c.V, c.T, c.levels, NULL, c.gamma));
   }
   if (!I.count[TSHHT3_STATE]) c.T = 0;
@@ -311,7 +310,6 @@ PetscErrorCode ConsistentStart(TS ts, Prepared &have, Vec rate)
 
 } // namespace
 
-/* Everything of t_n from U0, V0: the common part of a start and of a consistent restart */
 PetscErrorCode StartFromState(TS ts, Prepared &have)
 {
   Integrator &I = Get(ts);
@@ -344,7 +342,6 @@ static PetscErrorCode CheckInitialNumbers(TS ts, Vec x, const char what[])
           PetscIsNanScalar(value) ? "not a number (NaN)" : PetscRealPart(value) > 0 ? "infinite" : "minus infinite", (double)ts->ptime);
 }
 
-/* From vec_sol and vec_dot at ptime; history is forgotten */
 PetscErrorCode StartFromSolution(TS ts)
 {
   Integrator &I = Get(ts);

@@ -95,7 +95,6 @@ PetscErrorCode LeaveBDF(TS ts)
 
 } // namespace
 
-/* tau_j = t1 - t_{n+1-j}, j = 1, 2, ..., of a step to t1, as far as the history reaches */
 void Spans(const Order &o, PetscReal t1, PetscReal tau[])
 {
   for (PetscInt j = 0; j <= o.past; j++) tau[j] = t1 - o.t[j];
@@ -135,7 +134,6 @@ PetscErrorCode ViewOrder(TS ts, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At a start: order two, no history */
 void ResetOrder(TS ts)
 {
   Integrator &I = Get(ts);
@@ -173,7 +171,6 @@ void CommitOrder(Integrator &I)
   o.now    = PetscMin(o.next, PetscMax(2, o.past));
 }
 
-/* Keeps only n states of the past, and lowers the order if it needs more */
 PetscErrorCode CutPast(TS ts, PetscInt n)
 {
   Order &o = Get(ts).order;

@@ -61,8 +61,6 @@ PetscErrorCode Bisect(TS ts, const Line &l, PetscReal begin, Vec F, PetscReal *s
 
 } // namespace
 
-/* After the correction dX, which has led to X: if the next one has the opposite direction, moves X to the zero between them; F is then the
-   residual there */
 PetscErrorCode BisectIterates(TS ts, Vec X, Vec dX, Vec F, PetscBool *found)
 {
   Integrator &I = Get(ts);

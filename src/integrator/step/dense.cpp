@@ -123,7 +123,6 @@ PetscReal StepFraction(const Integrator &I, PetscReal t) { return t == I.t1 ? 1 
    after an error; and when event functions are evaluated before the first step of a start. */
 bool IsBeginOfStep(TS ts, PetscReal t) { return (Get(ts).event_ahead || (!Get(ts).have_step && Get(ts).at_begin)) && t == ts->ptime; }
 
-/* Any of U, V, A may be NULL. t lies between the ends of the last accepted step. */
 PetscErrorCode Interpolate(TS ts, PetscReal t, Vec U, Vec V, Vec A)
 {
   Integrator &I = Get(ts);

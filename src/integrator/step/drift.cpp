@@ -135,7 +135,6 @@ PetscErrorCode SetDriftOfStart(TS ts, Vec rate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Corrects the velocities at t_n for a step of length I.h after one of h_last, see above */
 PetscErrorCode AdaptVelocities(TS ts)
 {
   Integrator     &I = Get(ts);

@@ -78,7 +78,6 @@ static PetscErrorCode FirstWeights(TS ts, const Tolerances &tol, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Updates Y_i and the weights after U has been accepted; all: of every entry, and not only where Y_i has grown */
 PetscErrorCode UpdateWeights(TS ts, Vec U, bool all)
 {
   Integrator &I   = Get(ts);
@@ -149,7 +148,6 @@ PetscErrorCode CorrectionNorm(TS ts, Vec dX, PetscReal h, PetscReal *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* to = dX times the squares of the weights: VecDot() with it is the inner product whose norm is CorrectionNorm() up to a factor */
 PetscErrorCode WeightCorrection(const Integrator &I, Vec dX, Vec to)
 {
   PetscFunctionBegin;

@@ -140,7 +140,6 @@ PetscInt NextToFixed(const Order &o) { return o.now < o.max && o.wait == 0 && o.
 
 } // namespace
 
-/* The local error of an attempt of order above two, in units of the tolerance */
 PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte)
 {
   Integrator    &I = Get(ts);

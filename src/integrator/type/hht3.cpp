@@ -47,11 +47,8 @@ PetscErrorCode DuplicateAll(TS ts)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.X, &I.U1, &I.V1, &I.A1, &I.ymax, &I.weight, &I.base[0], &I.base[1], &I.base[2], &I.predictor.X[0]}) {
-    if (*v) continue;
-    PetscCall(VecDuplicate(ts->vec_sol, v));
-    PetscCall(VecZeroEntries(*v));
-  }
+  for (Vec *v : {&I.U0, &I.V0, &I.A0, &I.X0, &I.X, &I.U1, &I.V1, &I.A1, &I.ymax, &I.weight, &I.base[0], &I.base[1], &I.base[2], &I.predictor.X[0]})
+    if (!*v) PetscCall(VecDuplicate(ts->vec_sol, v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -163,18 +160,9 @@ PetscErrorCode TSReset_HHT(TS ts)
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++)
     if (!I.is_set || (r == TSHHT3_COORDINATE && I.made_coordinates)) PetscCall(ISDestroy(&I.is[r]));
   I.made_coordinates = PETSC_FALSE;
-  I.role.clear();
-  I.moves.clear();
-  I.states.clear();
-  I.constrained.clear();
   if (I.h_chosen && ts->time_step == I.h_next) ts->time_step = unset_step; /* it is chosen again, unless the user has set one since */
-  static_cast<StepState &>(I)                = StepState();
-  static_cast<CorrectorState &>(I.corrector) = CorrectorState();
-  static_cast<PredictorState &>(I.predictor) = PredictorState();
-  static_cast<VerificationState &>(I.verify) = VerificationState();
-  static_cast<ChangeState &>(I.change)       = ChangeState();
-  static_cast<OrderState &>(I.order)         = OrderState();
-  I.p                                        = I.hht;
+  ForStates(I, [](auto &state) { state = {}; });
+  I.p               = I.hht;
   I.linear.chosen   = PETSC_FALSE;
   I.linear.scaled   = 0;
   I.linear.failed   = PC_NOERROR;

@@ -211,7 +211,6 @@ PetscErrorCode HooksLineSearch(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Our differences fill the matrix, which may be another one, too */
 PetscErrorCode HooksJacobian(TS ts)
 {
   Hooks &H = Get(ts).hooks;
@@ -338,7 +337,6 @@ PetscErrorCode HooksReturnDM(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the test of the SNES is the user's, who may have set it at any time */
 PetscBool HooksUserTest(TS ts) { return (PetscBool)!TestIsOurs(ts, ts->snes); }
 
 PetscErrorCode HooksRemove(TS ts)

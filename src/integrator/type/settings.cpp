@@ -29,8 +29,8 @@ PetscErrorCode CheckTolerance(TS ts, const char name[], PetscReal x, Vec v)
   PetscCall(VecGetLocalSize(v, &entries));
   PetscCall(VecGetSize(ts->vec_sol, &N));
   PetscCall(VecGetSize(v, &all));
-  PetscBool same = (PetscBool)(n == entries && N == all);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPIU_BOOL, MPI_LAND, PetscObjectComm((PetscObject)ts)));
+  bool same;
+  PetscCall(OnAllRanks(ts, n == entries && N == all, &same));
   PetscCheck(same, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_SIZ,
              "The vector of %s tolerances has %" PetscInt_FMT " entries and the solution %" PetscInt_FMT ", or they lie on other ranks: use VecDuplicate() of the solution (TSSetTolerances())", name, all, N);
   PetscCall(FirstWhere([](PetscInt, PetscScalar a) { return !IsTolerance(PetscRealPart(a)); }, &first, Read(v)));
@@ -186,7 +186,6 @@ PetscErrorCode OptionGiven(PetscObject object, const char name[], PetscBool *giv
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whatever may change between two runs, too */
 PetscErrorCode CheckSettings(TS ts)
 {
   PetscFunctionBegin;
@@ -199,7 +198,6 @@ PetscErrorCode CheckSettings(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After HooksInstall() */
 PetscErrorCode TakeSNESSettings(TS ts)
 {
   Integrator &I = Get(ts);

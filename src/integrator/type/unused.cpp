@@ -29,8 +29,7 @@ const char *const names[] = {"ts_hhtdae_",
                              "ts_hhtdae_resume",
                              nullptr};
 
-constexpr int      max_families           = 8;
-const char *const *families[max_families] = {names}; /* lists of names, each ended by NULL; the first entry is the beginning that they share */
+std::vector<const char *const *> families = {names}; /* lists of names, each ended by NULL; the first entry is the beginning that they share */
 
 /* Where the name of an option begins behind the prefix of its object; npos if it is of another family */
 size_t StemBegin(const std::string &option, const std::string &stem)
@@ -61,7 +60,7 @@ size_t EditDistance(const std::string &a, const std::string &b)
 std::string Remark(const std::string &option)
 {
   for (const char *const *family : families) {
-    const size_t at = family ? StemBegin(option, family[0]) : std::string::npos;
+    const size_t at = StemBegin(option, family[0]);
     if (at == std::string::npos) continue;
     const std::string prefix = option.substr(0, at), name = option.substr(at);
     const char       *nearest = nullptr;
@@ -147,7 +146,7 @@ PetscErrorCode ReportUnusedOptions(void)
 PetscErrorCode ForgetOptions(void)
 {
   PetscFunctionBegin;
-  std::fill(families + 1, families + max_families, nullptr);
+  families.resize(1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -174,11 +173,6 @@ PetscErrorCode TSHHT3DeclareOptions(const char *const names[])
 {
   PetscFunctionBegin;
   PetscAssertPointer(names, 1);
-  for (const char *const *&family : hht3::families) {
-    if (family == names) PetscFunctionReturn(PETSC_SUCCESS);
-    if (family) continue;
-    family = names;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "There is room for %d lists of options", hht3::max_families);
+  if (std::find(hht3::families.begin(), hht3::families.end(), names) == hht3::families.end()) hht3::families.push_back(names);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
