@@ -10,7 +10,6 @@ if(HHTDAE_SANITIZE) # an interpreter without the sanitizer inside cannot load it
 endif()
 
 # What the build needs to know of an interpreter, a line for each; nothing if it has no petsc4py for this PETSc
-pkg_get_variable(petsc_prefix PETSc prefix)
 set(question [[
 import os, sys, sysconfig
 import petsc4py
