@@ -184,8 +184,6 @@ if(TARGET hhtflexible)
 endif()
 hhtdae_script(petsc_choice ${PROJECT_SOURCE_DIR} ${CMAKE_COMMAND} ${PETSC_PCFILEDIR})
 hhtdae_script(exports ${PROJECT_SOURCE_DIR}/include ${libraries})
-hhtdae_script(unused_options $<TARGET_FILE:pendulum> $<TARGET_FILE:chain> ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG})
-hhtdae_script(fp_trap $<TARGET_FILE:pendulum> $<TARGET_FILE:doublependulum> $<TARGET_FILE:campbell>)
 hhtdae_script(python_pendulum $<TARGET_FILE:hhtdae>)
 
 # The Python package, from the build tree: a test for each file of tests/python
@@ -226,6 +224,8 @@ if(HHTDAE_PROGRAMS)
     set_tests_properties(integration.bench_scripts PROPERTIES PROCESSORS 2 ENVIRONMENT "${test_environment}") # scripts that start mpiexec
   endif()
   hhtdae_script(examples ${CMAKE_RUNTIME_OUTPUT_DIRECTORY})
+  hhtdae_script(unused_options $<TARGET_FILE:pendulum> $<TARGET_FILE:chain> ${MPIEXEC_EXECUTABLE} ${MPIEXEC_NUMPROC_FLAG})
+  hhtdae_script(fp_trap $<TARGET_FILE:pendulum> $<TARGET_FILE:doublependulum> $<TARGET_FILE:campbell>)
   # A slice of "make kill9", and every example resumed in its middle
   hhtdae_script(kill9 ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${PROJECT_BINARY_DIR}/kill9 10)
   foreach(ranks 1 2)

@@ -1,5 +1,5 @@
-"""Which PETSc, and what with it, a configuration takes: PETSC_DIR with none, a PETSc with complex scalars, the right one without a SLEPc of its own, and
-another one in the same build tree. Some of these are there in name only.
+"""Which PETSc, and what with it, a configuration takes: PETSC_DIR with none, a PETSc with complex scalars, the right one without a SLEPc of its own, with
+examples and without, and another one in the same build tree. Some of these are there in name only.
 
 usage: petsc_choice.py source-tree cmake directory-of-PETSc.pc
 """
@@ -26,9 +26,9 @@ def write(path, text):
 with tempfile.TemporaryDirectory(prefix="petsc-choice-") as work:
     build, system = os.path.join(work, "build"), os.path.join(work, "system")
 
-    def configured(name, fits):
+    def configured(name, fits, *options):
         """What is said of a configuration with the PETSc of that name, as one line"""
-        done = subprocess.run([cmake, "-S", source, "-B", build, "-DHHTDAE_WITH_PYTHON=OFF", "-DPETSC_ARCH=", "-DPETSC_DIR=" + os.path.join(work, name)],
+        done = subprocess.run([cmake, "-S", source, "-B", build, "-DHHTDAE_WITH_PYTHON=OFF", "-DPETSC_ARCH=", "-DPETSC_DIR=" + os.path.join(work, name), *options],
                               capture_output=True, text=True, env={**os.environ, "PKG_CONFIG_PATH": "", "PKG_CONFIG_LIBDIR": system})
         said = " ".join((done.stdout + done.stderr).split())
         check((done.returncode == 0) == fits, "%s: status %d: %s" % (name, done.returncode, said[-4000:]))
@@ -60,4 +60,4 @@ with tempfile.TemporaryDirectory(prefix="petsc-choice-") as work:
         mumps = re.search("^MUMPS_LIBRARY:.*=(.*)", file.read(), flags=re.MULTILINE)
     check(not mumps or "-ldmumps" not in package or mumps.group(1) == library, "MUMPS is not PETSc's: %s" % (mumps and mumps.group(1)))
     has("was configured for the PETSc in", configured("complex", False))
-    configured("real", True)
+    configured("real", True, "-DHHTDAE_PROGRAMS=OFF")
