@@ -14,6 +14,10 @@
 
 #include <petscts.h>
 
+#if defined(PETSC_USE_COMPLEX) || !defined(PETSC_USE_REAL_DOUBLE)
+#error "hhtdae needs a PETSc with real scalars of double precision: set PETSC_DIR and PETSC_ARCH to one"
+#endif
+
 #if defined(__cplusplus)
 extern "C" {
 #endif

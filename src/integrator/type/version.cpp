@@ -1,6 +1,8 @@
 /* The PETSc that the library was built for, and the one that runs */
 #include "integrator/compat.h"
 
+static const char instruction[] = "build hhtdae with the PETSc of this program, make -f makefile.petsc build PETSC_DIR=... PETSC_ARCH=...";
+
 static const char *Flavour(PetscInt release) { return release ? "" : " (development)"; }
 
 /*
@@ -10,21 +12,23 @@ static const char *Flavour(PetscInt release) { return release ? "" : " (developm
 */
 PetscErrorCode HHT3CheckPetscVersion(void)
 {
-  PetscInt number[4]; /* major, minor, subminor, release */
-  size_t   width;
+  PetscInt      number[4]; /* major, minor, subminor, release */
+  size_t        width;
+  PetscDataType scalar = PETSC_DATATYPE_UNKNOWN;
+  PetscBool     found  = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(PetscDataTypeGetSize(PETSC_INT, &width));
   PetscCheck(width == sizeof(PetscInt), PETSC_COMM_SELF, PETSC_ERR_LIB,
-             "This libhhtdae was built for a PETSc with integers of %d bits, and one with %d runs: build hhtdae with the PETSc of "
-             "this program, make -f makefile.petsc build PETSC_DIR=... PETSC_ARCH=...",
-             (int)(8 * sizeof(PetscInt)), (int)(8 * width));
+             "This libhhtdae was built for a PETSc with integers of %d bits, and one with %d runs: %s",
+             (int)(8 * sizeof(PetscInt)), (int)(8 * width), instruction);
+  PetscCall(PetscDataTypeFromString("scalar", &scalar, &found));
+  PetscCheck(scalar == PETSC_DOUBLE, PETSC_COMM_SELF, PETSC_ERR_LIB, "hhtdae needs a PETSc with real scalars of double precision, and one with %s runs",
+             scalar == PETSC_COMPLEX ? "complex scalars" : "scalars of another precision");
   PetscCall(PetscGetVersionNumber(&number[0], &number[1], &number[2], &number[3]));
   PetscCheck(number[0] == PETSC_VERSION_MAJOR && number[1] == PETSC_VERSION_MINOR && number[3] == PETSC_VERSION_RELEASE, PETSC_COMM_SELF,
              PETSC_ERR_LIB,
-             "This libhhtdae was built for PETSc %d.%d%s, and PETSc %d.%d.%d%s runs: build hhtdae with the PETSc of this program, "
-             "make -f makefile.petsc build PETSC_DIR=... PETSC_ARCH=...",
-             PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR, Flavour(PETSC_VERSION_RELEASE), (int)number[0], (int)number[1], (int)number[2],
-             Flavour(number[3]));
+             "This libhhtdae was built for PETSc %d.%d%s, and PETSc %d.%d.%d%s runs: %s", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR,
+             Flavour(PETSC_VERSION_RELEASE), (int)number[0], (int)number[1], (int)number[2], Flavour(number[3]), instruction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
