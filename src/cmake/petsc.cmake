@@ -66,8 +66,14 @@ endif()
 set(HHTDAE_PETSC ${petsc_prefix} CACHE INTERNAL "The PETSc of this tree")
 find_package(MPI REQUIRED COMPONENTS C CXX)
 
-# SLEPc, for flexible bodies: optional. It has to be one for this PETSc; that of the system is for the system's. Debian has SLEPc and PETSc in several
-# builds side by side.
+# SLEPc, for flexible bodies: optional, that of SLEPC_DIR or one beside PETSc. It has to be one for this PETSc; that of the system is for the system's.
+# Debian has SLEPc and PETSc in several builds side by side.
+if(NOT SLEPC_DIR AND NOT "$ENV{SLEPC_DIR}" STREQUAL "")
+  set(SLEPC_DIR "$ENV{SLEPC_DIR}" CACHE STRING "Of a SLEPc of one's own")
+endif()
+if(SLEPC_DIR)
+  set(ENV{PKG_CONFIG_PATH} "${SLEPC_DIR}/${PETSC_ARCH}/lib/pkgconfig:${SLEPC_DIR}/lib/pkgconfig:$ENV{PKG_CONFIG_PATH}")
+endif()
 pkg_search_module(SLEPC QUIET IMPORTED_TARGET SLEPc slepc)
 if(SLEPC_FOUND)
   pkg_get_variable(SLEPC_PCFILEDIR ${SLEPC_MODULE_NAME} pcfiledir)

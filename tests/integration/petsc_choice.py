@@ -24,12 +24,12 @@ def write(path, text):
 
 
 with tempfile.TemporaryDirectory(prefix="petsc-choice-") as work:
-    build, system = os.path.join(work, "build"), os.path.join(work, "system")
+    build, slepc = os.path.join(work, "build"), os.path.join(work, "slepc")
 
     def configured(name, fits, *options):
         """What is said of a configuration with the PETSc of that name, as one line"""
         done = subprocess.run([cmake, "-S", source, "-B", build, "-DHHTDAE_WITH_PYTHON=OFF", "-DPETSC_ARCH=", "-DPETSC_DIR=" + os.path.join(work, name), *options],
-                              capture_output=True, text=True, env={**os.environ, "PKG_CONFIG_PATH": "", "PKG_CONFIG_LIBDIR": system})
+                              capture_output=True, text=True, env={**os.environ, "PKG_CONFIG_PATH": "", "PKG_CONFIG_LIBDIR": work, "SLEPC_DIR": slepc})
         said = " ".join((done.stdout + done.stderr).split())
         check((done.returncode == 0) == fits, "%s: status %d: %s" % (name, done.returncode, said[-4000:]))
         return said
@@ -47,8 +47,8 @@ with tempfile.TemporaryDirectory(prefix="petsc-choice-") as work:
           re.sub("^Libs: ", "Libs: -L%s " % os.path.dirname(library), package, flags=re.MULTILINE).replace("-ldmumps", "-ldmumps_64"))
     # A SLEPc for the complex one
     version = re.search(r"^Version: *(\d+\.\d+)", package, flags=re.MULTILINE).group(1)
-    write(os.path.join(system, "slepc.pc"), "Name: SLEPc\nDescription: of another PETSc\nVersion: %s.1\nCflags: -I%s\n" % (version, system))
-    write(os.path.join(system, "slepcconf.h"), '#define SLEPC_PETSC_DIR "%s"\n#define SLEPC_PETSC_ARCH "complex"\n' % work)
+    write(os.path.join(slepc, "lib", "pkgconfig", "slepc.pc"), "Name: SLEPc\nDescription: of another PETSc\nVersion: %s.1\nCflags: -I%s\n" % (version, slepc))
+    write(os.path.join(slepc, "slepcconf.h"), '#define SLEPC_PETSC_DIR "%s"\n#define SLEPC_PETSC_ARCH "complex"\n' % work)
 
     has("has no lib/pkgconfig/PETSc.pc", configured("none", False))
     has("are complex", configured("complex", False))
