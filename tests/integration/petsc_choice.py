@@ -56,6 +56,7 @@ with tempfile.TemporaryDirectory(prefix="petsc-choice-") as work:
     said = configured("real", True)
     has("is not for this PETSc", said)
     has("flexible bodies are left out", said)
+    has("needs flexible bodies", subprocess.run([cmake, "--build", build, "--target", "atv_frame"], capture_output=True, text=True).stdout)
     with open(os.path.join(build, "CMakeCache.txt")) as file:
         mumps = re.search("^MUMPS_LIBRARY:.*=(.*)", file.read(), flags=re.MULTILINE)
     check(not mumps or "-ldmumps" not in package or mumps.group(1) == library, "MUMPS is not PETSc's: %s" % (mumps and mumps.group(1)))
