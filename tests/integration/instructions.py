@@ -43,9 +43,9 @@ with tempfile.TemporaryDirectory(prefix="instructions-", dir=build) as work:
             works(program, name + " " + flavour, LD_LIBRARY_PATH=libraries, **environment)
 
     tree = os.path.join(work, "with-cmake")
-    run([cmake, "-S", os.path.join(here, "numbers"), "-B", tree, "-DCMAKE_PREFIX_PATH=" + prefix, "-DCMAKE_CXX_FLAGS=-march=native -O1"])
+    run([cmake, "-S", os.path.join(here, "numbers"), "-B", tree, "-DCMAKE_PREFIX_PATH=" + prefix, "-DCMAKE_CXX_FLAGS=-march=native -O1", "-DCMAKE_CXX_STANDARD=14"])
     run([cmake, "--build", tree])
-    works(os.path.join(tree, "outside_numbers"), "with CMake, -march=native")
+    works(os.path.join(tree, "outside_numbers"), "with CMake, -march=native, and the C++ of a compiler that is older than the headers'")
 
     # Without the packages' flags hhtdae's headers see to it themselves, and refuse an Eigen that is there before them.
     bare = [flag for flag in run(["pkg-config", "--cflags", "hhtscene"], PKG_CONFIG_PATH=paths).split() if not flag.startswith("-DEIGEN")]
