@@ -25,9 +25,9 @@ namespace
 {
 
 /* Corrections relative to the unknowns: converged; and the largest that may be rounding where they no longer fall, also of what forces and constraints leave of their terms */
-constexpr PetscReal converged_correction = 1e-13, rounding_correction = 1e-8;
+constexpr PetscReal converged_correction = 1e-10, rounding_correction = 1e-8;
 constexpr PetscReal slow_rate            = 0.3; /* rate beyond which the matrix is made again at the iterate */
-constexpr PetscInt  max_iterations       = 30;  /* at a rate of `slow_rate` 13 digits take 25 */
+constexpr PetscInt  max_iterations       = 20;  /* at a rate of `slow_rate` 10 digits take 20 */
 
 /* Rows of constraints of F: Phi_q q'' + gamma. The columns of states are left out, since gamma follows s along V. */
 PetscErrorCode ConstraintRows(const Integrator &I, Consistent &c)
