@@ -1,6 +1,7 @@
 /*
-  Attachments of flexible bodies in the description: each is a frame, described as a body without mass, which six constraints fix to a point of the flexible body that
-  follows its modes. Only assembly and the redundancy check use them; a run has neither coordinates nor multipliers for them, see carrier.h.
+  Attachments of flexible bodies in the description. Each is a frame, described as a body without mass, that six constraints fix to a point of the
+  flexible body, which moves with its modes. Only assembly and the redundancy check use these constraints; a run has neither coordinates nor
+  multipliers for attachments, see carrier.h. With i the frame and e the point of the flexible body:
 
     x_i - x_e = 0,  axes of i parallel to those of e,   x_e = r + A (s + Psi_x eta),  R_e = A exp([Psi_theta eta])
 */
@@ -17,7 +18,7 @@ class AttachStore : public StoreBase
 {
 public:
   struct Item {
-    PetscInt element = -1, marker[2] = {-1, -1}; /* on the flexible body, on the frame */
+    PetscInt element = -1, marker[2] = {-1, -1}; /* markers on the flexible body and on the frame */
   };
   std::vector<Item> all;
 
@@ -30,7 +31,7 @@ public:
   int           rows() const override { return 6; }
   unsigned char active(PetscInt) const override { return 0x3f; }
   bool          isExplicit() const override { return true; }
-  bool                   neverRedundant() const override { return true; } /* no two attachments have the same frame */
+  bool                   neverRedundant() const override { return true; } /* each attachment has its own frame, so that its rows are independent */
   bool                   hasGeometricStiffness() const override { return false; }
   bool          usesVelocities() const override { return false; }
   void          localize(Localizer &, std::vector<std::unique_ptr<Batch>> &) const override {}
@@ -38,7 +39,8 @@ public:
   std::unique_ptr<Probe> probe(Localizer &l, PetscInt e) const override;
 };
 
-/* Copies the memories of the elements on an attachment from the run's batches to its probe */
+/* Copies the memories of elements from the run's batches to the probe of an attachment, which contains probes of the
+   elements that act on its frame */
 void RecallMemories(Probe &p, const std::vector<std::unique_ptr<Batch>> &batches);
 
 } // namespace hhtdae

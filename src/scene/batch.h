@@ -1,4 +1,5 @@
-/* Batches: lists of instances of joints, forces, variables or states that add to the residual and the matrix. */
+/* A batch is the list of this rank's instances of one kind of joint, force, variable or state; it adds their terms to the
+   residual and the Jacobian. */
 #ifndef HHTDAE_SCENE_BATCH_H
 #define HHTDAE_SCENE_BATCH_H
 
@@ -12,19 +13,21 @@
 namespace hhtdae
 {
 
-/* A scalar unknown that an element reads: local number, and group and offset of its column in the matrix. local = -1: a dropped multiplier, which is zero. */
+/* A scalar unknown that an element reads: its local number, its group of columns in the matrix and its offset in that
+   group. local = -1: a dropped multiplier, which is zero. */
 struct Input {
   PetscInt local = -1, group = -1, offset = 0;
 };
 
-/* One evaluation: state of the local unknowns (own, then other ranks'), own rows of the residual or arrays of the matrix */
+/* Arguments and results of one evaluation: the state of the local unknowns (own, then other ranks'), and own rows of the
+   residual or the arrays of the matrix */
 struct Evaluation {
   double        t;
   const double *u, *v, *a;
   Bodies       &bodies;
-  PetscInt      n;                      /* own unknowns */
-  double       *F  = nullptr;           /* residual, set to zero before; null in a Jacobian */
-  double        sv = 0, sa = 0;         /* the Jacobian is F_u + sv F_v + sa F_a */
+  PetscInt      n;                      /* number of own unknowns */
+  double       *F  = nullptr;           /* residual, which the caller sets to zero; null when the Jacobian is evaluated */
+  double        sv = 0, sa = 0;         /* shifts of the Jacobian F_u + sv F_v + sa F_a */
   Sink          sink{nullptr, nullptr};
 
   double input(const Input &i) const { return i.local < 0 ? 0 : u[i.local]; }
@@ -42,27 +45,28 @@ class Batch
 public:
   virtual ~Batch() = default;
   virtual void pattern(Pattern &p) = 0;       /* requests blocks of the matrix */
-  virtual void resolve(const Pattern &p);     /* gets their slots */
-  virtual void residual(Evaluation &e) = 0;   /* own rows, and loads on bodies */
-  virtual void jacobian(Evaluation &e) = 0;   /* the matrix, and loads on bodies */
-  /* updates the memory after an accepted step, to which the bodies have been moved */
+  virtual void resolve(const Pattern &p);     /* looks up the slots of these blocks */
+  virtual void residual(Evaluation &e) = 0;   /* adds to own rows, and adds the loads on bodies */
+  virtual void jacobian(Evaluation &e) = 0;   /* adds to the matrix, and adds the loads on bodies */
+  /* updates the memory after an accepted step; the bodies have been moved to its state */
   virtual void accept(Bodies &) {}
   /* potential energy of the instances that belong to this rank, at the present state of the bodies */
   virtual double energy(const Evaluation &) const { return 0; }
-  /* Upper bound on the next step, s, at the present velocities and accelerations, so that no contact is tunnelled through and no counted angle turns by more than half
-     a turn; limitsSteps(): whether there are such instances */
+  /* longestStep(): upper bound on the next step, s, at the present velocities and accelerations, so that no contact is
+     tunnelled through and no counted angle turns by more than half a turn. limitsSteps(): whether instances have such a
+     bound */
   virtual bool   limitsSteps() const { return false; }
   virtual double longestStep(const Evaluation &) const { return std::numeric_limits<double>::infinity(); }
-  /* adds energy and momentum of own coordinates that do not belong to bodies of the scene */
+  /* adds the energy and momentum of own coordinates of extensions (extension.h), which belong to no body of the scene */
   virtual void addTo(Balance &, const Evaluation &) const {}
-  /* memory of accepted steps, for checkpoints: number of values; copies them from x (in) or to x */
+  /* memory of accepted steps, for checkpoints. memory(): number of values; copyMemory(): copies them from the array (in) or to it */
   virtual PetscInt memory() const { return 0; }
   virtual void     copyMemory(double *, bool in) { (void)in; }
-  /* whether the memory begins with that of the stores, StoreBase::remember() */
+  /* whether the memory belongs to instances of a store, whose initial values StoreBase::remember() sets */
   virtual bool isDescribed() const { return false; }
   /* copies the memory of one instance, by its number in its store; false if the instance is not in this batch */
   virtual bool memoryOf(const StoreBase *, PetscInt, double *) const { return false; }
-  /* The angle of a marker about the z axis of another, by their numbers in the scene; false if no instance counts its turns */
+  /* The angle of a marker about the z axis of another, both by their numbers in the scene; false if no instance counts its full turns */
   virtual bool countedAngle(PetscInt, PetscInt, double *) const { return false; }
 
 protected:
@@ -77,13 +81,14 @@ inline void Batch::resolve(const Pattern &p)
   std::vector<PetscInt>().swap(request_);
 }
 
-/* ---- groups of coordinates of a marker's body ---- */
+/* ---- groups of coordinates of a marker's body; Turns(): whether a group is the rotation ---- */
 
 inline bool Turns(BodyKind k, int group) { return (k == BodyKind::Planar || k == BodyKind::Attached || TurnsInSpace(k)) && group == 1; }
 inline bool PlanarScene(BodyKind k) { return k == BodyKind::Planar || k == BodyKind::PlanarPoint; }
 
-/* Whether derivatives between x or theta of a row marker and of a column marker, as `pair` states, contribute to groups (g, h) of
-   their bodies: rotations of a body move the origins of its markers, too. */
+/* Whether a block between two markers contributes to the block of groups (g, h) of their bodies. pair(a, b): whether the
+   block's part with rows a and columns b, 0 for x and 1 for theta of a marker, can be nonzero. A rotation of a body also
+   moves the origins of its markers. */
 template <class Pair> bool Reaches(const Pair &pair, BodyKind row, int g, BodyKind column, int h)
 {
   const bool tr = Turns(row, g), tc = Turns(column, h);
@@ -102,7 +107,7 @@ struct HasLongestStep<K, std::void_t<decltype(K::longestStep(std::declval<const 
                                                                (const Twist<double> *)nullptr, 0., 0.))>> : std::true_type {
 };
 
-/* of one instance */
+/* The bound of one instance. The centripetal term w^2 |s| is added to the acceleration of the body's origin. */
 template <class K, class Instance> double LongestStep(const Instance &e, const Evaluation &ev)
 {
   const Bodies &B = ev.bodies;
@@ -142,7 +147,7 @@ template <class K, class Instance> void Remember(Instance &e, const Bodies &B)
   (void)B;
 }
 
-/* The instances of a store that are in a batch, for kernels with memory */
+/* Numbers, in their store, of the instances in a batch; only for kernels with memory */
 struct InstancesOf {
   const StoreBase      *store = nullptr;
   std::vector<PetscInt> number; /* increasing */
@@ -169,7 +174,7 @@ template <class K, class Instances> bool AngleOf(const Instances &all, const Ins
   return false;
 }
 
-/* copies from x (in) or to x; returns x + K::memory */
+/* Copies the memory of an instance from x (in) or to x; returns x + K::memory */
 template <class K, class Instance> double *CopyMemory(Instance &e, double *x, bool in)
 {
   if constexpr (K::memory > 0) {

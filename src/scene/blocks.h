@@ -1,4 +1,5 @@
-/* Blocks of the matrix between the coordinates of two markers' bodies: functions common to all kernels, compiled once. */
+/* Blocks of the matrix between the coordinates of two markers' bodies. These functions are common to all kernels, so that
+   they are compiled only once. */
 #ifndef HHTDAE_SCENE_BLOCKS_H
 #define HHTDAE_SCENE_BLOCKS_H
 
@@ -9,28 +10,31 @@ namespace hhtdae
 
 using Six = Matrix<6, 6>;
 
-/* Transforms derivatives A by the frame and, unless null, V by the twist of marker `column`, of a load (force, moment) on marker `row`, to the coordinates of both
-   bodies. The change of the load's lever with rotations of the row's body is not included, see AddLever(). */
+/* Derivatives of the generalized force on the body of marker `row` by the coordinates of the body of marker `column`. A
+   and, unless null, V are the derivatives of the load (force, moment) on marker `row` by frame and twist of marker
+   `column`. AddLever() adds the change of the load's lever arm with rotations of the row's body. */
 Six PairBlock(const Evaluation &ev, PetscInt row, const Frame<double> &at_row, PetscInt column, const Frame<double> &at_column, const Six &A,
               const Six *V = nullptr);
 
-/* Adds the change of the moment s x f of a force fixed in space with rotations of its body, s from the centre of mass to the marker: [f][s], in
-   coordinates */
+/* Adds the derivative of the moment s x f by rotations of the body, [f][s], transformed to its coordinates. The force f
+   is fixed in space; s is the vector from the centre of mass to the marker. */
 void AddLever(const Bodies &B, PetscInt marker, const Frame<double> &at, const Vector3 &f, Six &H);
 
-/* Adds derivatives V by the twist of a marker `column` on an attachment's frame to the columns of its v and w, for the groups of the row's body
-   on which the load acts; returns the number of slots used. PairBlock() covers the dependence of the twist on positions. */
+/* Adds derivatives V of a load by the twist of marker `column`, which is on an attachment's frame, to the columns of v
+   and w of that frame. loads: whether the load acts on each group of the row's body. Returns the number of slots used.
+   PairBlock() contains the dependence of the twist on positions. */
 int RateBlocks(const Evaluation &ev, PetscInt row, const Frame<double> &at_row, PetscInt column, const Frame<double> &at_column, const Six &V, const Slot *slot,
                const bool *loads);
 
-/* The part of D that belongs to groups g and h of two bodies */
+/* Adds the part of D that belongs to group g of the row's body and group h of the column's */
 void AddBlock(const Sink &sink, const Slot &slot, const Six &D, BodyKind row, int g, BodyKind column, int h);
 
-/* Bits of a marker's position (1) and rotation (2) in `depends` and `acts` of kernels; Reach(): whether they involve group g of its body */
+/* OfMarker(): the bits of marker k in a kernel's `depends` or `acts`, 1 for its position and 2 for its rotation. Reach():
+   whether a marker with these bits involves group g of its body */
 inline unsigned OfMarker(unsigned mask, int k) { return mask >> (2 * k) & 3; }
 inline bool     Reach(unsigned bits, BodyKind b, int g) { return (bits & 1) || (Turns(b, g) && (bits & 2)); }
 
-/* - J^T lambda: the load of constraints on the body of one marker; J: the marker's six columns of their gradients */
+/* - J^T lambda, the load of constraints on the body of one marker; J: the six columns of the gradient that belong to the marker */
 template <int rows> Wrench<double> Reaction(const double *J, const double *lambda)
 {
   Wrench<double> on;
@@ -42,25 +46,28 @@ template <int rows> Wrench<double> Reaction(const double *J, const double *lambd
   return on;
 }
 
-/* Minus the block (k, l) of 6 x 6 blocks of a matrix of that leading dimension */
+/* Minus the 6 x 6 block (k, l) of a matrix with the given leading dimension */
 Six MinusBlock(const double *A, int leading, int k, int l);
 
-/* - d load / d scalars: n columns in the coordinates of one marker's body, from the marker's six rows J of that leading dimension; acts: bits of the
-   marker. n is 1, 2, 3 or 6. */
+/* Adds - d load / d z for n scalars z (1, 2, 3 or 6) in the rows of one marker's body. J: derivatives of the load on the
+   marker, six rows of a matrix with the given leading dimension; acts: bits of the marker, OfMarker(); offset: first
+   column in the group of z. */
 template <int n>
 void AddScalars(Evaluation &ev, PetscInt marker, const Frame<double> &at, const double *J, int leading, unsigned acts, PetscInt offset, const Slot *&slot);
 
 /* out = - H^T y; H: n x n */
 void MinusTransposed(const double *H, int n, const double *y, double *out);
 
-/* Constraints' rows and the columns of their multipliers in the coordinates of one marker's body. J: the marker's six columns of their gradients;
-   at velocity level J belongs to the twist and P to the frame, else P is null. active: bits of the rows that are not redundant; used: bits of the marker.
-   There may be 1, 2 or 3 rows. */
+/* Adds the rows of constraints, and the columns of their multipliers, in the coordinates of one marker's body. J: the six
+   columns of the gradient that belong to the marker; at velocity level J is the derivative by the twist and P by the
+   frame, else P is null. active: bits of the rows that are not dropped; used: bits of the marker, OfMarker(). `rows` is
+   1, 2 or 3. */
 template <int rows>
 void AddGradient(Evaluation &ev, PetscInt marker, const Frame<double> &at, const double *J, const double *P, unsigned active, unsigned used, const Slot *&slot);
 
-/* A block of constraints' curvature. H: theirs between the frames of the two markers, of the given leading dimension; pairs: whether it can be nonzero,
-   bit 2x + y for x or theta of the row's marker and of the column's; lever: unless null, J^T lambda at the marker on the diagonal, see AddLever() */
+/* AddCurvature() adds a block of d(J^T lambda)/dq. H: d(J^T lambda)/d frames for the two markers, with the given leading
+   dimension, or null if it is zero. pairs: bit 2a + b is set if rows a and columns b of H, 0 for x and 1 for theta, can
+   be nonzero. lever: unless null, the force of J^T lambda at the marker, which is row and column, see AddLever(). */
 struct FramePair {
   PetscInt             row, column; /* markers */
   const Frame<double> &at_row, &at_column;

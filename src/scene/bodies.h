@@ -1,10 +1,10 @@
 /*
-  The bodies of this rank: its own, then those of other ranks on which its joints and forces act, then the ground; with their present
+  The bodies on this rank: its own, then copies of other ranks' bodies on which its joints and forces act, then the ground. Contains their present
   motion, the loads of the elements, and the transformation from perturbations of markers to generalized coordinates.
 
-  The residual of a body is inertia minus load, in space axes, transformed to the coordinates at the end:
-  rows of r: m r'' - f;  rows of the rotation: G^T (N - m), N = I w' + w x I w, I = A J A^T (moments about the centre of mass), with
-  dA = [G dU] A for rotational coordinates U, see rotation.h.
+  The residual of a body is inertia force minus load, computed in space axes and then transformed to its coordinates. Rows of
+  the position r: m r'' - f. Rows of the rotation: G^T (N - m), N = I w' + w x I w, I = A J A^T, with moments about the centre
+  of mass and dA = [G dU] A for rotational coordinates U, see rotation.h.
 */
 #ifndef HHTDAE_SCENE_BODIES_H
 #define HHTDAE_SCENE_BODIES_H
@@ -24,21 +24,21 @@ namespace hhtdae
 /* Attached: the frame of an attachment of a flexible body, which has no coordinates */
 enum class BodyKind : unsigned char { Ground, Point, Rigid, Planar, PlanarPoint, Flexible, Attached };
 
-constexpr int max_coordinates = 6; /* of a body, without modal ones */
-/* without modal coordinates, which are a third group of a flexible body; see Bodies::modes() */
+constexpr int max_coordinates = 6; /* largest number of coordinates of a body, not counting modal coordinates */
+/* Number of coordinates without modal coordinates; these are the third group of a flexible body, see Bodies::modes() */
 inline int Coordinates(BodyKind k)
 {
   constexpr int n[] = {0, 3, 6, 3, 2, 6, 0};
   return n[(int)k];
 }
 inline bool TurnsInSpace(BodyKind k) { return k == BodyKind::Rigid || k == BodyKind::Flexible; }
-/* Coordinates come in groups whose rows of the matrix have the same columns */
+/* Number of groups of coordinates. The rows of a group have nonzeros in the same columns of the matrix (pattern.h) */
 inline int Groups(BodyKind k)
 {
   if (k == BodyKind::Attached) return 2;
   return k == BodyKind::Ground ? 0 : TurnsInSpace(k) || k == BodyKind::Planar ? 2 : 1;
 }
-/* Attachments' frames have groups for velocity and acceleration, too: x, theta, v, w, a, alpha, see projection.h */
+/* Attachments' frames also have groups for velocity and acceleration: x, theta, v, w, a, alpha, see projection.h */
 constexpr int frame_groups = 6, first_rate_group = 2;
 /* group 0: position, group 1: rotation */
 inline int GroupSize(BodyKind k, int group)
@@ -48,27 +48,29 @@ inline int GroupSize(BodyKind k, int group)
 }
 inline int GroupOffset(BodyKind k, int group) { return group == 0 ? 0 : GroupSize(k, 0); }
 
-/* data that are constant in a step */
+/* Data of a body that are constant during a step */
 struct LocalBody {
   BodyKind kind  = BodyKind::Ground;
   bool     owned = false;
   PetscInt first   = -1; /* local number of the first coordinate */
   PetscInt group = -1;
   PetscInt id    = -1; /* in the scene */
-  PetscInt modal   = -1; /* of a flexible body: its number in Bodies::modal */
-  PetscInt carrier = -1, place = -1; /* of an attachment's frame: number of its body in Bodies::carriers, and its own number in Carrier::attached */
+  PetscInt modal   = -1; /* number of a flexible body in Bodies::modal */
+  /* for the frame of an attachment: number of its flexible body in Bodies::carriers, and of the frame in
+     Carrier::attached */
+  PetscInt carrier = -1, place = -1;
   double   mass  = 0;
-  Matrix3  J;          /* inertia in body axes; planar: J(2,2) */
-  Matrix3  C;          /* A = exp([x]) C, or body axes to the axes of the Euler angles */
+  Matrix3  J;          /* inertia in body axes; planar bodies use J(2,2) only */
+  Matrix3  C;          /* reference attitude: A = exp([x]) C for local rotation vectors x, A = A313(eps) C for Euler angles eps */
 };
 
-/* present motion and load */
+/* Present motion of a body, and the loads on it */
 struct BodyMotion {
   Vector3   r, v, w;
   Matrix3   A;
-  Matrix3   G;     /* of bodies with rotations in space */
-  Vector3   w0;    /* of the same, for the matrix of a step: w at the beginning of the step */
-  Vector3   f, m;  /* load: force, moment about the centre of mass */
+  Matrix3   G;     /* dA = [G dU] A, rotation.h; only for bodies with rotations in space */
+  Vector3   w0;    /* w at the beginning of the step, for the Newton matrix of that step (inStep()); only for the same bodies */
+  Vector3   f, m;  /* sum of the loads: force, moment about the centre of mass */
 };
 
 struct LocalMarker {
@@ -77,36 +79,40 @@ struct LocalMarker {
   Matrix3  R; /* axes, in body axes */
 };
 
-/* A flexible body: its equations, the load of its attachments on the modes, and storage for its matrix. The last members are the sum of all attachments' contributions to the
-   matrix: by position and angles (`rigid`), by the modes to the first six rows (`rigid_modal`, transposed) and vice versa, and modes by modes. */
+/* A flexible body: its equations of motion, the load of its attachments on the modes, and storage for its diagonal
+   blocks. The members from `outer` on are the sums of all attachments' contributions to these blocks: `rigid` has the six
+   coordinates of the floating frame as rows and columns, `rigid_modal` (stored transposed) and `modal_rigid` couple these
+   with the modes, and `outer`, `stiffening` and `unsymmetric` add to the part modes by modes. */
 struct ModalPart {
   using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   std::unique_ptr<ModalDynamics>           dynamics;
   Eigen::VectorXd                          load;
   ModalGradient                            gradient;
-  RowMajor                                 block; /* coordinates x coordinates, and behind them the padding of the modes */
+  RowMajor                                 block; /* coordinates x coordinates, extended by the padding of the modes */
   ModalOuter                               outer;
-  Eigen::MatrixXd                          stiffening; /* no rows: no attachment has any */
+  Eigen::MatrixXd                          stiffening; /* geometric stiffness; no rows if no attachment has any */
   Matrix<6, 6>                             rigid;
-  Eigen::Matrix<double, Eigen::Dynamic, 6> rigid_modal, modal_rigid; /* no rows: no attachment is in use */
-  Eigen::MatrixXd                          unsymmetric; /* modes by modes, what `outer` leaves; no rows: nothing */
+  Eigen::Matrix<double, Eigen::Dynamic, 6> rigid_modal, modal_rigid; /* no rows if no attachment is in use */
+  /* unsymmetric remainder of the modes by modes part, whose symmetric part is in `outer`; no rows if there is none */
+  Eigen::MatrixXd                          unsymmetric;
 };
 
 class Bodies
 {
 public:
-  std::vector<LocalBody>   body; /* own, other ranks', ground */
+  std::vector<LocalBody>   body; /* own bodies, copies of other ranks' bodies, ground */
   std::vector<BodyMotion>  now;
   std::vector<LocalMarker> marker;
   std::vector<ModalPart>   modal;
   std::vector<Carrier>     carriers; /* flexible bodies with attachments in use */
-  PetscInt                 own = 0;
+  PetscInt                 own = 0; /* number of own bodies */
   long                     moves      = 0;     /* number of calls of move() */
   bool                     local = false; /* rotations are local vectors, not Euler angles */
-  double                   commutator = 0;     /* sv times TSHHT3GetRotationFactor(), in the matrix of a step; else 0 */
+  /* sv times the factor of TSHHT3GetRotationFactor() while the Newton matrix of a step is computed; else 0 */
+  double                   commutator = 0;
   Vector3                  gravity = Vector3::Zero();
 
-  /* motion of all bodies from their coordinates and rates; clears the loads */
+  /* Sets the motion of all bodies from their coordinates and velocities; clears the loads */
   void move(const double *u, const double *v);
   int  modes(PetscInt b) const { return body[b].modal < 0 ? 0 : modal[body[b].modal].dynamics->modes(); }
   int  coordinates(PetscInt b) const { return Coordinates(body[b].kind) + modes(b); }
@@ -121,8 +127,8 @@ public:
     if constexpr (with_axes) f.R.noalias() = b.A * k.R;
     return f;
   }
-  Vector3 angularAcceleration(PetscInt b, const double *v, const double *a) const; /* of all rates and accelerations */
-  Vector3 acceleration(PetscInt b, const double *v, const double *a) const;        /* of its origin */
+  Vector3 angularAcceleration(PetscInt b, const double *v, const double *a) const; /* v, a: all local velocities and accelerations */
+  Vector3 acceleration(PetscInt b, const double *v, const double *a) const;        /* of the centre of mass or floating frame's origin */
   Twist<double> twist(PetscInt m, const Frame<double> &f) const
   {
     const BodyMotion &b = now[marker[m].body];
@@ -135,14 +141,16 @@ public:
     b.m += moment + (at.x - b.r).cross(f);
   }
 
-  /* J, columns (x, theta) of marker m at f, to the coordinates of its body; returns their number. R is 1, 2, 3 or 6; columns.cpp */
+  /* Transforms derivatives J by (x, theta) of marker m, whose frame is f, to derivatives by the coordinates of its body
+     (out); returns the number of these. R is 1, 2, 3 or 6; columns.cpp */
   template <int R> int columns(PetscInt m, const Frame<double> &f, const Matrix<R, 6> &J, Matrix<R, 6> &out) const;
-  /* Derivative of the rotation vector in a step by that of Newmark's relations: the former has a further term in the angular velocities, TSHHT3GetRotationFactor(). Derivatives
-     of the residual by U have to be multiplied by it, rows of moments have not. */
+  /* Derivative of the rotation vector of a step by the vector that Newmark's relations give: the rotation vector has a
+     further term in the angular velocities, TSHHT3GetRotationFactor(). Derivatives of the residual by rotational
+     coordinates are multiplied by this matrix from the right; the rows G^T m of moments are not affected. */
   Matrix3 inStep(const BodyMotion &b) const { return commutator == 0 ? Matrix3(Matrix3::Identity()) : Matrix3(Matrix3::Identity() - commutator * Cross<double>(b.w0)); }
-  /* the same for the result of columns() */
+  /* Multiplies the result of columns() by inStep() */
   template <int R> void inStep(PetscInt m, Matrix<R, 6> &out) const;
-  /* J, columns (v, w) of marker m: adds its derivatives by the coordinates and, times sv, by their velocities to out */
+  /* J: derivatives by (v, w) of marker m. Adds to `out` the resulting derivatives by the coordinates and, times sv, by their velocities */
   template <int R> void velocityColumns(PetscInt m, const Frame<double> &f, const double *v, double sv, const Matrix<R, 6> &J, Matrix<R, 6> &out) const;
   /* dw/dU + sv dw/dU' */
   Matrix3 angularVelocityGradient(const BodyMotion &b, const double *rate, double sv) const
@@ -155,15 +163,16 @@ public:
   void residual(const double *u, const double *v, const double *a, double *F);
   /* adds sv dF/dv + sa dF/da + dF/du of body b to B (coordinates x coordinates, row major of leading dimension 6) */
   void jacobian(PetscInt b, const double *u, const double *v, const double *a, double sv, double sa, Eigen::Matrix<double, 6, 6, Eigen::RowMajor> &B) const;
-  /* the same of a flexible body, all its coordinates: ModalPart::block */
+  /* The same for a flexible body and all its coordinates; the result is ModalPart::block */
   void modalJacobian(PetscInt b, const double *u, const double *v, const double *a, double sv, double sa);
-  ModalMotion modalMotion(PetscInt b, const double *u, const double *v, const double *a) const; /* without a: q'' is not used */
+  ModalMotion modalMotion(PetscInt b, const double *u, const double *v, const double *a) const; /* a may be null: accelerations are then not used */
   /* transfers the loads on attachments' frames to their bodies, after all elements have added theirs */
   void loadCarriers()
   {
     for (Carrier &c : carriers) c.load(*this);
   }
-  /* Derivatives of attitude, w and alpha in a step by the rotational coordinates and, times sv and sa, by their velocities and accelerations */
+  /* Derivatives of the rotation (G), of w and of alpha in a step by the rotational coordinates, plus sv and sa times the
+     derivatives by their velocities and accelerations */
   struct AngularGradient {
     Matrix3 G, w, alpha;
   };

@@ -1,4 +1,4 @@
-/* All instances of one constraint kernel on this rank: rows Phi, reactions Phi_q^T lambda, and their derivatives. */
+/* All instances of one constraint kernel on this rank: rows Phi, terms Phi_q^T lambda of the equations of motion, and the derivatives of both. */
 #ifndef HHTDAE_SCENE_CONSTRAINT_BATCH_H
 #define HHTDAE_SCENE_CONSTRAINT_BATCH_H
 
@@ -15,9 +15,9 @@ template <class K> class ConstraintBatch : public Batch
 public:
   struct Instance {
     PetscInt         marker[M];
-    PetscInt         lambda; /* first multiplier among the local unknowns; its row is the constraint's */
-    PetscInt         group;
-    unsigned char    active; /* bits of the rows that are not redundant */
+    PetscInt         lambda; /* local number of the first multiplier, and of the first row of the constraint */
+    PetscInt         group;  /* of the multipliers */
+    unsigned char    active; /* bits of the rows that are not dropped */
     Input            input[Z > 0 ? Z : 1];
     typename K::Data data;
   };
@@ -31,7 +31,7 @@ public:
         const LocalBody &b = bodyOf(B, e, k);
         for (int g = 0; g < Groups(b.kind); g++) {
           if (!uses(b.kind, g, k)) continue;
-          /* the block is diagonal if all rows are components of x_j - x_i */
+          /* rows that are all components of x_j - x_i have diagonal blocks with the positions */
           const bool diagonal = K::purely_translational && g == 0 && GroupSize(b.kind, g) == R && (e.active & all_rows) == all_rows;
           request_.push_back(p.need(e.group, b.group + g, diagonal));
           request_.push_back(p.need(b.group + g, e.group, diagonal));
@@ -119,9 +119,9 @@ public:
     return false;
   }
   Bodies     *bodies = nullptr;
-  InstancesOf of; /* where K::memory > 0 */
+  InstancesOf of; /* only filled if K::memory > 0 */
 
-  /* frames, twists where they are used, multipliers (zero in dropped rows), inputs */
+  /* Reads the arguments of an instance: frames, twists if they are used, multipliers (zero for dropped rows), inputs */
   static void gather(const Evaluation &ev, const Instance &e, Frame<double> *f, Twist<double> *w, double *lambda, double *z)
   {
     for (int k = 0; k < M; k++) {
@@ -144,7 +144,7 @@ private:
     if (k == l && Turns(b, g) && Turns(c, h) && Depends(K::depends, 2 * k)) return true; /* AddLever() */
     return InPairs(pairs(k, l), b, g, c, h);
   }
-  static constexpr unsigned pairs(int k, int l) /* of AddCurvature() */
+  static constexpr unsigned pairs(int k, int l) /* `pairs` of AddCurvature() for markers k and l */
   {
     unsigned bits = 0;
     for (int x = 0; x < 2; x++)
@@ -152,7 +152,7 @@ private:
     return bits;
   }
 
-  /* the velocity of an attachment's frame has separate columns */
+  /* whether the block has separate columns for v and w: those of attachments' frames, on which constraints at velocity level depend */
   static bool byRates(BodyKind b) { return !K::holonomic && b == BodyKind::Attached; }
 
   static void value(const Instance &e, const Frame<double> *f, const Twist<double> *w, double t, const double *z, double *psi)
@@ -167,7 +167,7 @@ private:
     if constexpr (!K::holonomic) K::gradient(e.data, f, w, t, z, J, P, zj);
   }
 
-  /* - Phi_q^T lambda as a load */
+  /* Adds - Phi_q^T lambda as a load on the bodies */
   static void react(Bodies &B, const Instance &e, const Frame<double> *f, const double *lambda, const typename K::Gradient &J)
   {
     if constexpr (K::purely_translational) { /* no need to multiply by ones and zeros */
@@ -183,7 +183,7 @@ private:
     }
   }
 
-  /* rows of Phi and columns of lambda */
+  /* Adds the rows of Phi and the columns of lambda */
   static void gradientBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, typename K::Gradient &J,
                              const typename K::Gradient &P, const double *zj, const Slot *&slot)
   {
@@ -200,7 +200,7 @@ private:
     (void)zj;
   }
 
-  /* d(Phi_q^T lambda)/dq, without d(G^T m)/dq, which the body adds */
+  /* Adds d(Phi_q^T lambda)/dq; Bodies::jacobian() adds d(G^T m)/dq for fixed moments m */
   static void curvatureBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, const Twist<double> *w, const double *z,
                               const double *lambda, const typename K::Gradient &J, const Slot *&slot)
   {

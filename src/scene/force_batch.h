@@ -1,4 +1,5 @@
-/* All instances of one force kernel on this rank: forces evaluated in the equations of motion (the default), or force states F - f(...) = 0, (7b). */
+/* All instances of one force kernel on this rank. Forces are evaluated in the equations of motion (the default), or are
+   unknown force states F with the equations F - f(...) = 0, (7b). */
 #ifndef HHTDAE_SCENE_FORCE_BATCH_H
 #define HHTDAE_SCENE_FORCE_BATCH_H
 
@@ -13,19 +14,19 @@ namespace hhtdae
 template <class K> struct ForceInstance {
   static constexpr int Z = K::inputs;
   PetscInt         marker[K::markers];
-  PetscInt             state = -1, state_group = -1; /* first force state and its group, if there are force states */
+  PetscInt             state = -1, state_group = -1; /* local number of the first force state, and its group; -1 without force states */
   Input            input[Z > 0 ? Z : 1];
   typename K::Data data;
 };
 
-/* A kernel with a potential has  static double energy(const Data &, const Frame<double> *f);  used only for the balance of energy */
+/* A kernel with a potential may define  static double energy(const Data &, const Frame<double> *f);  only the balance of energy uses it */
 template <class K, class = void> struct HasEnergy : std::false_type {
 };
 template <class K>
 struct HasEnergy<K, std::void_t<decltype(K::energy(std::declval<const typename K::Data &>(), (const Frame<double> *)nullptr))>> : std::true_type {
 };
 
-/* Common part of both: blocks between the coordinates of the markers' bodies */
+/* Common part of ForceBatch and ForceStateBatch: blocks between the coordinates of the markers' bodies */
 template <class K> class ForceBatchBase : public Batch
 {
 protected:
@@ -35,7 +36,7 @@ protected:
 public:
   std::vector<Instance> all;
   Bodies               *bodies = nullptr;
-  InstancesOf            of; /* where K::memory > 0 */
+  InstancesOf            of; /* only filled if K::memory > 0 */
 
   void accept(Bodies &B) override
   {
@@ -74,7 +75,7 @@ public:
 protected:
   static const LocalBody &bodyOf(const Bodies &B, const Instance &e, int k) { return B.body[B.marker[e.marker[k]].body]; }
 
-  /* owned by the owner of the first movable body, as in OwnerOf() */
+  /* Whether this rank owns the instance: the owner of its first movable body does, as in OwnerOf() */
   bool mine(const Instance &e) const
   {
     for (int k = 0; k < M; k++) {
@@ -84,7 +85,7 @@ protected:
     return false;
   }
 
-  /* whether the load acts on group g of marker k's body; whether it depends on the group */
+  /* loads(): whether the load acts on group g of the body of marker k; uses(): whether it depends on that group */
   static bool loads(BodyKind b, int g, int k)
   {
     return Reach(OfMarker(K::acts, k), b, g);
@@ -126,7 +127,7 @@ protected:
     for (int k = 0; k < M; k++) ev.bodies.load(e.marker[k], f[k], on[k].f, on[k].m);
   }
 
-  /* adds - d load, from derivatives of the wrenches by frames and twists (null if there are none) */
+  /* Adds - d load/dq. frames, twists: derivatives of the wrenches `on`; twists is null if the wrenches do not depend on them */
   static void bodyBlocks(Evaluation &ev, const Instance &e, const Frame<double> *f, const Wrench<double> *on, const Matrix<6 * M, 6 * M> &frames,
                          const Matrix<6 * M, 6 * M> *twists, const Slot *&slot)
   {
@@ -151,7 +152,7 @@ protected:
       }
   }
 
-  /* derivatives by the velocities of attachments' frames, which have separate columns */
+  /* Derivatives by v and w of attachments' frames, which have separate columns (projection.h) */
   static bool byRates(const Instance &e, const Bodies &B, int l) { return K::damped && bodyOf(B, e, l).kind == BodyKind::Attached; }
   void        ratePattern(const Instance &e, Pattern &p)
   {
@@ -173,7 +174,7 @@ protected:
       }
   }
 
-  /* - d load / d scalars: columns of one group of size n */
+  /* Adds - d load/dz for the n scalars z of one group, from column `offset` of the group on */
   template <int n>
   static void scalarColumns(Evaluation &ev, const Instance &e, const Frame<double> *f, const double *J, PetscInt offset, const Slot *&slot)
   {
@@ -181,7 +182,7 @@ protected:
   }
 };
 
-/* Without force states */
+/* Forces that are evaluated in the equations of motion */
 template <class K> class ForceBatch : public ForceBatchBase<K>
 {
   using Base = ForceBatchBase<K>;
@@ -236,7 +237,7 @@ public:
   }
 };
 
-/* With force states: rows F - c(...) = 0; loads depend on F and the frames only */
+/* Forces with force states F: rows F - c(...) = 0; the loads depend on F and the frames only */
 template <class K> class ForceStateBatch : public ForceBatchBase<K>
 {
   using Base = ForceBatchBase<K>;
@@ -296,7 +297,7 @@ public:
   }
 
 private:
-  /* rows F - c = 0 */
+  /* Adds the derivatives of the rows F - c = 0 */
   static void definition(Evaluation &ev, const typename Base::Instance &e, const Frame<double> *f, const Twist<double> *w, const double *z,
                          const Slot *&slot)
   {
@@ -339,7 +340,7 @@ private:
     }
   }
 
-  /* loads Pi(q) F */
+  /* Adds the loads Pi(q) F and their derivatives */
   static void load(Evaluation &ev, const typename Base::Instance &e, const Frame<double> *f, const Slot *&slot)
   {
     constexpr int n = 6 * M, N = n + C;

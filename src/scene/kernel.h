@@ -1,7 +1,8 @@
 /*
-  What a joint, a motion or a force is to the assembly: a kernel, a struct of static functions of marker frames in space axes.
-  The assembly turns marker perturbations into generalized coordinates, so that a kernel knows nothing of rotation vectors, Euler angles, planar
-  bodies or modes. Kernels are compiled into loops over all their instances (batch.h); nothing is virtual inside such a loop.
+  Kernels: each joint, motion or force is implemented by one or more structs of static functions of marker frames in space
+  axes. The assembly transforms derivatives by perturbations of markers to generalized coordinates, so that a kernel contains
+  nothing about rotation vectors, Euler angles, planar bodies or modes. Kernels are compiled into loops over all their
+  instances (batch.h), without virtual calls inside the loop.
 
   A holonomic constraint Phi(frames, t) = 0
 
@@ -12,7 +13,7 @@
       template <class T> static void value(const Data &, const Frame<T> *f, const T &t, T *phi);
     };
 
-  gets gradient and curvature by automatic differentiation from Constraint<>; kernels for which speed matters define their own:
+  gets its gradient and curvature by automatic differentiation from Constraint<>; kernels for which speed matters define these functions themselves:
 
       static void gradient(const Data &, const Frame<double> *f, double t, Matrix<rows, 6*markers> &J);    J = dPhi/d(x_0, theta_0, x_1, ...)
       static void curvature(const Data &, const Frame<double> *f, double t, const double *lambda, Matrix<6*markers, 6*markers> &H);
@@ -21,24 +22,25 @@
 
   where theta perturbs a frame as R -> (1 + [theta]) R with the origin held, see frames.h.
 
-  A velocity-level (non-holonomic) constraint Psi(frames, twists, t) = 0, linear in the twists: derive from VelocityConstraint<>,
-  value() takes the twists after the frames,
-  and after t the scalars z if it has `inputs`. What `depends` states of positions and rotations of markers holds for their
-  velocities and angular velocities too, here and in forces.
+  A velocity-level (non-holonomic) constraint Psi(frames, twists, t) = 0, linear in the twists, derives from
+  VelocityConstraint<>. Its value() has the twists as an argument after the frames, and the scalars z after t if it has
+  `inputs`. The bits of `depends` for positions and rotations of markers also apply to their velocities and angular
+  velocities, here and in forces.
 
-  A force: components c(frames, twists, t, z), and the wrenches on the markers' bodies that they stand for,
+  A force has components c(frames, twists, t, z) and the wrenches on the markers' bodies that follow from them,
 
     struct K : Force<K, markers, components> {
       template <class T> static void components(const Data &, const Frame<T> *f, const Twist<T> *w, const T &t, const T *z, T *c);
       template <class T> static void apply(const Data &, const Frame<T> *f, const T *c, Wrench<T> *on);
     };
 
-  so that the components can be force states F of the paper: then c are unknowns, and the load depends on them through apply() only.
-  `damped`: components() depends on the twists. `inputs`: number of further scalar unknowns z (multipliers, V, states) on which it depends.
+  so that the components can be force states F of the paper: then c are unknowns, and the load depends on them and on the frames through apply() only.
+  `damped`: components() depends on the twists. `inputs`: number of further scalar unknowns z (multipliers, V, states) on which components() depends.
 
-  Memory of accepted steps (unwinding of angles, say): `static constexpr int memory = 1`, Data begins with `double memory[1]`, and
-  accept(Data &, frames) updates it after each accepted step. `angles`: number of its first values that are angles over full turns of marker
-  2k about the z axis of marker 2k+1 (or as markersOfAngle() states); queries of a run use them.
+  A kernel with memory of accepted steps, such as counted turns of an angle, has `static constexpr int memory = 1` (number of
+  values), a Data that begins with `double memory[1]`, and accept(Data &, frames), which updates them after each accepted
+  step. `angles`: number of leading values that are angles, over full turns, of marker 2k about the z axis of marker 2k+1 (or
+  of the markers that markersOfAngle() returns); queries of a run read them.
 */
 #ifndef HHTDAE_SCENE_KERNEL_H
 #define HHTDAE_SCENE_KERNEL_H
@@ -77,9 +79,10 @@ template <class K, int M, int R> struct ConstraintBase {
   static constexpr int      markers = M, rows = R, size = 6 * M;
   static constexpr int      memory = 0, inputs = 0, angles = 0;
   static constexpr unsigned depends = Everything(M);
-  static constexpr bool     needs_rotation = true; /* false: f[k].R may be left undefined */
-  static constexpr bool     own_units            = false; /* rows have units that the user chooses, neither lengths nor sines */
-  static constexpr bool     prescribes_angle     = false; /* angleAt() gives the angle of marker 0 about z of marker 1 at any time */
+  static constexpr bool     needs_rotation = true; /* false: f[k].R need not be set */
+  /* the user's functions determine the units of the rows; otherwise rows are lengths or sines */
+  static constexpr bool     own_units            = false;
+  static constexpr bool     prescribes_angle     = false; /* the kernel has angleAt(data, t), the prescribed angle of marker 0 about z of marker 1 */
   static constexpr bool     purely_translational = false; /* row r is component r of the second marker's position minus that of the first */
   using Data                               = Empty;
   using Gradient                           = Matrix<R, size>;
@@ -116,7 +119,7 @@ template <class K, int M, int R> struct Constraint : ConstraintBase<K, M, R> {
       for (int a = 0; a < N; a++) H.row(a) += lambda[r] * DerivativeRow(phi[r].derivatives()(a));
   }
 
-  /* the partial derivative Phi_t; zero for kernels that do not depend on time */
+  /* rate: the partial derivative Phi_t; zero for kernels that do not depend on time */
   static constexpr bool driven = false; /* value() depends on t */
   template <class Data> static void time(const Data &d, const Frame<double> *f, double t, double *rate)
   {
@@ -201,7 +204,7 @@ private:
   }
 };
 
-/* Wrenches of all markers as one vector, and its derivatives */
+/* Derivatives of the wrenches of all markers, stacked as one vector (f_0, m_0, f_1, ...), by frames, twists and inputs */
 template <int M, int Z> struct ForceJacobian {
   Matrix<6 * M, 6 * M>          frames, twists;
   Matrix<6 * M, (Z > 0 ? Z : 1)> inputs;
@@ -209,8 +212,8 @@ template <int M, int Z> struct ForceJacobian {
 
 template <class K, int M, int C> struct Force {
   static constexpr int      markers = M, count = C, size = 6 * M, inputs = 0, memory = 0, angles = 0;
-  static constexpr unsigned depends = Everything(M); /* what components() and apply() use */
-  static constexpr unsigned acts    = Everything(M); /* Position(k): a force at k, Rotation(k): a moment at k */
+  static constexpr unsigned depends = Everything(M); /* positions and rotations that components() and apply() read */
+  static constexpr unsigned acts    = Everything(M); /* loads: Position(k) for a force at marker k, Rotation(k) for a moment */
   static constexpr bool     damped = true, needs_rotation = true, prescribes_angle = false;
   static constexpr bool     may_be_force_states = true; /* the user can choose force states for the components */
   using Data = Empty;

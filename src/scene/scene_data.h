@@ -1,4 +1,4 @@
-/* A scene as its user describes it: the same on every rank, before anything is numbered. */
+/* A scene as its user describes it, before unknowns are numbered; every rank has the same complete description. */
 #ifndef HHTDAE_SCENE_DATA_H
 #define HHTDAE_SCENE_DATA_H
 
@@ -19,31 +19,36 @@ namespace hhtdae
 struct FlexibleData {
   std::shared_ptr<const ModalBody> model;
   ModalMass                        mass;
-  std::vector<double>              damping, deformation, deformation_rate; /* ratios, modal coordinates at the start */
+  /* of each mode: damping ratio; modal coordinate and its rate at the start */
+  std::vector<double>              damping, deformation, deformation_rate;
   PetscInt                         frame = -1;                             /* marker of the floating frame, for modal loads and contacts of nodes */
 
-  /* Points to which markers can be attached: attachments, then kept nodes */
+  /* The k-th point to which markers can be attached; attachments come first, then kept nodes */
   const ModalAttachment &place(PetscInt k) const
   {
     const std::size_t n = model->attachments.size(), i = (std::size_t)k;
     return i < n ? model->attachments[i] : model->nodes[i - n];
   }
 };
-Eigen::VectorXd ModalDamping(const FlexibleData &f); /* 2 zeta omega */
+Eigen::VectorXd ModalDamping(const FlexibleData &f); /* 2 zeta omega of each mode, 1/s */
 
 struct BodyData {
   std::string name;
   bool        point = false, fixed_start = false;
   double      mass = 0;
   Matrix3     inertia;  /* about the centre of mass, body axes */
-  Vector3     center;   /* of mass, from the body's origin, body axes */
+  Vector3     center;   /* centre of mass relative to the body's origin, body axes */
   Vector3     r;        /* centre of mass at the start */
   Matrix3     A;        /* body axes at the start */
   Vector3     v, w;     /* at the start, space axes */
-  std::shared_ptr<const FlexibleData> flexible; /* of a flexible body; then the rest belongs to its floating frame, undeformed */
-  PetscInt                            carrier = -1, attachment = -1;     /* if this is the frame of an attachment or node: its flexible body and number in FlexibleData::place(); it has no coordinates in a run */
-  bool                                forces_alone = false;              /* the frame of a node whose rotation its neighbours do not determine: it takes forces, no moments */
-  bool                                massless     = false;              /* the frame of an attachment, of a flexible body or of an extension */
+  /* null for rigid bodies; for a flexible body the other members describe the undeformed body and its floating frame */
+  std::shared_ptr<const FlexibleData> flexible;
+  /* if this body is the frame of an attachment or node: its flexible body, and its number in FlexibleData::place(); in a
+     run the frame has no coordinates */
+  PetscInt                            carrier = -1, attachment = -1;
+  /* the frame of a node whose rotation the neighbouring nodes do not determine: forces, but no moments, may act on it */
+  bool                                forces_alone = false;
+  bool                                massless     = false;              /* the frame of an attachment of a flexible body or of an extension */
   double                              light_mass = 0, light_inertia = 0; /* least mass and moments of inertia in the metric of assembly, FillLight() */
 };
 
@@ -57,7 +62,9 @@ struct MarkerData {
 struct ScalarRef {
   enum Kind { Multiplier, ForceState, Variable, State, Modal } kind = Variable;
   PetscInt id        = -1; /* element, variable, state or flexible body */
-  PetscInt component = 0;  /* row of the element's constraints, in the order of its parts; component of its force; mode */
+  /* Multiplier: row among all rows of the element, in the order of its parts; ForceState: component of the force; Modal:
+     mode */
+  PetscInt component = 0;
 };
 
 class StoreBase; /* all instances of one kernel, store.h */
@@ -82,7 +89,7 @@ struct ElementData {
   std::string       name;
   const char       *type; /* "revolute" */
   Kind              kind = Force;
-  Marker            i, j; /* of the element; reactions are given on i's body */
+  Marker            i, j; /* reactions are those on i's body */
   std::vector<Part> parts;
 };
 
@@ -90,7 +97,7 @@ struct ExpressionData { /* variable or state */
   std::string name;
   Expression  expression;
   double      initial;
-  bool        reached = false; /* `initial` is from a run */
+  bool        reached = false; /* `initial` was computed by a run (state.cpp), not given by the user */
 };
 
 struct ChannelData {
@@ -104,8 +111,8 @@ struct ShapeData {
 };
 
 struct SurfaceData {
-  PetscInt                       body;    /* a flexible one */
-  std::shared_ptr<const Surface> surface; /* read on the first rank alone */
+  PetscInt                       body;    /* a flexible body */
+  std::shared_ptr<const Surface> surface; /* only the first rank reads it */
 };
 
 /* Results of assembly, redundancy check and equilibrium */
@@ -114,8 +121,9 @@ struct StartResult {
     PetscInt element;
     int      row; /* among the element's rows */
   };
-  PetscInt         coordinates = 0, rows = 0, core = 0; /* rows: of constraints; core: rows left after tree structures were removed */
-  PetscInt         redundant = 0;                       /* rows, dropped or not */
+  /* numbers of coordinates, of rows of constraints, and of the rows left after tree structures were removed */
+  PetscInt         coordinates = 0, rows = 0, core = 0;
+  PetscInt         redundant = 0;                       /* number of redundant rows, dropped or not */
   std::vector<Row> dropped;
   double           misfit = 0, velocity_misfit = 0; /* largest violation of an element's constraints, relative to the mechanism's size and to `speed` */
   double           speed = 0;                       /* largest speed of the scene */
@@ -124,7 +132,7 @@ struct StartResult {
   PetscInt         degreesOfFreedom() const { return coordinates - (rows - redundant); }
 };
 
-/* `described`: value with which elements were described; functions read the present one. Checkpoints have both */
+/* described: the value with which elements were described; present: the value that functions read during a run. Checkpoints store both. */
 struct ParameterData {
   std::string                   name;
   std::shared_ptr<const double> present;
@@ -152,24 +160,25 @@ struct SceneData {
   std::vector<ParameterData>  parameters;
   std::vector<std::string>    errors; /* found while the scene was described */
   std::set<std::string>       told;   /* notices that were printed, which runs with other parameters do not repeat */
-  StartPolicy                                           start;  /* with options */
+  StartPolicy                                           start;  /* as changed by options */
   StartResult                 started;
-  bool                                                  fixed        = false; /* from setUp() on nothing may be added but markers for queries */
-  std::size_t                                           markers_then = 0;     /* number of markers at that time */
+  bool                                                  fixed        = false; /* true from setUp() on: only markers for queries may be added then */
+  std::size_t                                           markers_then = 0;     /* number of markers at the end of setUp() */
 
   SceneData();
   ~SceneData();
-  /* The body on which an element acts: `body`, or, if `body` is an attachment on which it does not act, its flexible body (on whose modes it may act); -2: neither.
-     elsewhere: in the latter case another attachment of that flexible body on which the element acts, or -1 */
+  /* The body on which element e acts: `body`; or, if `body` is the frame of an attachment on which e does not act, the
+     flexible body of that attachment if e acts on it (on its modes); -2 if e acts on neither. elsewhere: if -2 is
+     returned, another attachment of that flexible body on which e acts, or -1 */
   PetscInt    loadedBody(const ElementData &e, PetscInt body, PetscInt *elsewhere = nullptr) const;
   std::string bodyName(PetscInt b) const { return b < 0 ? "ground" : bodies[b].name; }
-  /* Whether a body takes no moments; its name in messages then */
+  /* Whether no moment can act on a body because it has no rotation; the name of such a body in messages */
   bool        turnless(PetscInt b) const { return b >= 0 && (bodies[b].point || bodies[b].forces_alone); }
   std::string turnlessName(PetscInt b) const
   {
     return bodies[b].point ? "the point mass " + bodies[b].name : bodies[b].name + ", a node whose neighbours tell no rotation";
   }
-  /* Whether a handle is of this scene. Number 0 stands for a handle made by hand. */
+  /* Whether a handle belongs to this scene. A handle that was not returned by a scene has the number 0 and is accepted. */
   template <class Handle> bool mine(Handle h) const { return h.scene == 0 || h.scene == number; }
   std::size_t ownMarkers() const { return fixed ? markers_then : markers.size(); }
   bool valid(Marker m) const { return mine(m) && m.id >= 0 && m.id < (PetscInt)markers.size(); }
@@ -179,8 +188,8 @@ struct SceneData {
   {
     if (fixed) errors.push_back(what + " came too late: the scene is fixed from its set-up or first run on");
   }
-  Vector3 gravityAt(double t) const; /* minus the ground's acceleration */
-  /* at the start */
+  Vector3 gravityAt(double t) const; /* gravity minus the ground's acceleration */
+  /* Pose and velocity of a marker at the start, as described */
   Frame<double> frame(Marker m) const;
   Twist<double> twist(Marker m) const;
 };
@@ -208,23 +217,25 @@ public:
   ElementBuilder(Scene &scene, const std::string &name, const char *type, ElementData::Kind kind, Marker i, Marker j, bool pair = true);
 
   bool planar() const { return data_.planar; }
-  int  slidingAxis(int axis) const { return planar() && axis == 2 ? 0 : axis; } /* of j: z, the default, is x in a planar scene, along which Translational slides */
-  bool good() const { return good_; } /* no error so far: i and j are markers */
-  void require(bool condition, const std::string &message); /* "stiffness is -3, must not be negative" */
-  void require(Marker m, const char *what);                 /* m is a marker of this scene */
+  /* axis of j along which Translational slides; z, the default, is replaced by x in a planar scene */
+  int  slidingAxis(int axis) const { return planar() && axis == 2 ? 0 : axis; }
+  bool good() const { return good_; } /* no error so far; then i and j are valid markers */
+  /* adds `message`, such as "stiffness is -3, must not be negative", unless the condition holds */
+  void require(bool condition, const std::string &message);
+  void require(Marker m, const char *what);                 /* adds an error unless m is a marker of this scene */
   Frame<double>    frame(Marker m) const { return data_.frame(m); } /* at the start; only if good() */
   const SceneData &scene() const { return data_; }
   bool             coincident(Marker i, Marker j) const; /* at the start, up to rounding of the positions */
 
-  /* a constraint kernel on these markers; returns the first of its rows among the element's rows */
+  /* Adds an instance of a constraint kernel on these markers; returns the number of its first row among the element's rows */
   template <class K> PetscInt constrain(std::initializer_list<Marker> markers, const typename K::Data &data = {});
   template <class K> PetscInt constrain(const std::vector<Marker> &markers, const typename K::Data &data, const std::vector<ScalarRef> &inputs);
-  /* a force kernel; inputs: the scalars z of components(); state: the components become force states */
+  /* Adds an instance of a force kernel; inputs: the scalars z of components(); state: the components become force states */
   template <class K>
   void load(std::initializer_list<Marker> markers, const typename K::Data &data = {}, const std::vector<ScalarRef> &inputs = {},
             bool state = false);
 
-  /* an instance of a store of another kind */
+  /* Adds an item to a store that is neither a ConstraintStore nor a ForceStore, such as AttachStore */
   template <class S> void put(typename S::Item item);
 
   Element done();
