@@ -1,6 +1,6 @@
 /*
   Rows of a constraint at the described poses, for assembly and the redundancy check, before unknowns are numbered.
-  Every rank has the whole description and computes the same.
+  Every rank has the whole description and computes the same values.
   Included by store.h.
 */
 #ifndef HHTDAE_SCENE_DESCRIBED_ROWS_H
@@ -15,14 +15,15 @@ namespace hhtdae
 struct DescribedRows {
   static constexpr int max_rows = 8, max_markers = 6;
   const char          *name   = "";
-  bool                 length = true; /* rows are lengths (velocities), else sines of angles (angular velocities) */
-  double               value[max_rows] = {};          /* Phi; 0 at velocity level */
-  double               rate[max_rows]  = {};          /* Phi_t; Psi with all velocities zero */
+  bool                 length = true; /* true: rows are lengths, or velocities at velocity level; false: sines of angles, or angular velocities */
+  double               value[max_rows] = {};          /* Phi; zero at velocity level */
+  double               rate[max_rows]  = {};          /* Phi_t; at velocity level Psi with all velocities zero */
   Eigen::Matrix<double, max_rows, 6 * max_markers> J; /* Phi_q or Psi_q', columns (x, theta) of the markers */
-  Eigen::MatrixXd modal; /* by the modal coordinates of marker 0's body; empty: the rows do not depend on them */
+  Eigen::MatrixXd modal; /* derivatives by the modal coordinates of the body of marker 0; empty if the rows do not depend on them */
 };
 
-/* Divides rows with users' units by the largest gradient at a marker: they become lengths, or angles if they depend only on rotations */
+/* Divides rows with units chosen by the user by the largest norm of their gradient at a marker. They become lengths, or
+   angles if they depend only on rotations. */
 template <int R, int M> void MakeLengths(DescribedRows &rows)
 {
   for (int r = 0; r < R; r++) {
@@ -40,8 +41,9 @@ template <int R, int M> void MakeLengths(DescribedRows &rows)
   }
 }
 
-/* expressions.cpp: value of an input at the start. States have their initial values, variables are computed from these, time and positions
-   (UserConstraint.StartVelocitiesByAVariable); multipliers and force states are zero. */
+/* expressions.cpp: value of an input z at the start. States have their initial values. Variables are computed from
+   states, time and the described motion (UserConstraint.StartVelocitiesByAVariable). Multipliers and force states are
+   zero. */
 double InitialInput(const SceneData &s, const ScalarRef &r, double t);
 
 template <class K, class D> void DescribeRows(const SceneData &s, const D &d, double t, DescribedRows &rows)

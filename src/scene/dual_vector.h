@@ -1,6 +1,6 @@
 /*
-  Vectors and 3 x 3 matrices of numbers with derivatives: what kernels use of Eigen's, under the same names. Eigen's templates for
-  such numbers took most of the time to compile a kernel; and products are summed in one pass over the derivatives here.
+  Vectors and 3 x 3 matrices of dual numbers, with those of Eigen's member functions that kernels use, under the same names. Eigen's templates for
+  dual numbers took most of the compile time of a kernel. Here products are also summed in one pass over the derivatives.
 */
 #ifndef HHTDAE_SCENE_DUAL_VECTOR_H
 #define HHTDAE_SCENE_DUAL_VECTOR_H
@@ -35,7 +35,7 @@ template <int N, class T> Dual<N, T> ProductDifference(const Dual<N, T> &a, cons
 template <class D> class DualVector
 {
 public:
-  DualVector() = default; /* nothing is set, as in Eigen's */
+  DualVector() = default; /* leaves the entries unset, as Eigen does */
   DualVector(const D &x, const D &y, const D &z) : x_{x, y, z} {}
 
   D       &operator()(int i) { return x_[i]; }
@@ -66,7 +66,7 @@ private:
 template <class D> class DualMatrix
 {
 public:
-  class Transposed /* for the expression in which it stands */
+  class Transposed /* a reference to the matrix, valid within the expression that contains transpose() */
   {
   public:
     explicit Transposed(const DualMatrix &A) : A_(A) {}

@@ -8,7 +8,7 @@
 namespace hhtdae
 {
 
-/* Columns of G: the axes of phi', theta', psi' in space. The first is the space z axis. */
+/* Columns of G: the axes, in space, about which phi, theta and psi turn. The first is the z axis of space. */
 struct EulerAxes {
   Vector3 g2, g3;
   EulerAxes() = default;
@@ -30,7 +30,7 @@ inline void EulerFrame(const double eps[3], Matrix3 &A, EulerAxes &e)
   const double ss = std::sin(eps[2]), cs = std::cos(eps[2]);
   e.g2 = {cp, sp, 0};
   e.g3 = {sp * st, -cp * st, ct};
-  const Vector3 y(-sp * ct, cp * ct, st); /* second axis before the turn by psi */
+  const Vector3 y(-sp * ct, cp * ct, st); /* second axis before the rotation by psi */
   A.col(0) = cs * e.g2 + ss * y;
   A.col(1) = cs * y - ss * e.g2;
   A.col(2) = e.g3;
@@ -47,7 +47,7 @@ inline Vector3 AngularVelocity(const EulerAxes &e, const Vector3 &rate)
 {
   return Vector3(0, 0, rate(0)) + rate(1) * e.g2 + rate(2) * e.g3;
 }
-/* the part of w' that is quadratic in the rates, w' = G eps'' + c */
+/* c, the part of w' = G eps'' + c that is quadratic in the rates */
 inline Vector3 Convective(const EulerAxes &e, const Vector3 &rate, const Vector3 &w)
 {
   return rate(0) * CrossZ(w) + rate(1) * rate(2) * e.p();
@@ -70,22 +70,22 @@ inline Matrix3 MomentGradient(const EulerAxes &e, const Vector3 &m)
   D(2, 1) = e.p().dot(m);
   return D;
 }
-/* G^-1 w, singular at sin theta = 0 */
+/* eps' = G^-1 w, singular at sin theta = 0 */
 inline Vector3 EulerRates(const EulerAxes &e, const Vector3 &w)
 {
-  const double s2    = 1 - e.g3(2) * e.g3(2); /* sin^2 theta; n = z x g2 completes the plane of z and g3 */
+  const double s2    = 1 - e.g3(2) * e.g3(2); /* sin^2 theta */
   const double theta = e.g2.dot(w), along = w(2), spin = e.g3.dot(w);
   const double psi   = (spin - e.g3(2) * along) / s2;
   return {along - e.g3(2) * psi, theta, psi};
 }
 
-/* A body gets new axes if |sin theta| is below this: within 30 degrees of the singularity. */
+/* A body gets new axes if |sin theta| is below this value, that is within 30 degrees of the singularity. */
 constexpr double singular_sine = 0.5;
 
 /*
   Axes for a body of attitude A (body axes as columns) with angular velocity w: the constant rotation C of A = A313(eps) C for which a
-  steady rotation never needs other axes. With the third axis along w theta is constant; with the third axis horizontal and normal to w
-  theta oscillates about 90 degrees by the angle between w and the horizontal plane. The better of the two keeps |cos theta| <= 0.71.
+  steady rotation never needs other axes. With the third axis along w, theta is constant. With the third axis horizontal and normal to w,
+  theta oscillates about 90 degrees by the angle between w and the horizontal plane. The better of the two choices keeps |cos theta| <= 0.71.
 */
 Matrix3 ChooseAxes(const Matrix3 &A, const Vector3 &w);
 

@@ -1,4 +1,4 @@
-/* Rows V - f(...) = 0 of user-defined variables, x' - f(...) = 0 of states, F - f(...) = 0 of user's forces. */
+/* Rows V - f(...) = 0 of user-defined variables, x' - f(...) = 0 of first-order states, F - f(...) = 0 of users' force states. */
 #ifndef HHTDAE_SCENE_EXPRESSION_BATCH_H
 #define HHTDAE_SCENE_EXPRESSION_BATCH_H
 
@@ -21,15 +21,15 @@ public:
 
   int  size() const { return (int)pieces_.size(); }
   void value(const Evaluation &e, double *f) const;
-  /* values, and df/du + sv df/du' + sa df/du'' in the columns of the arguments */
+  /* Values f, and G = df/du + sv df/du' + sa df/du'' with the columns of `arguments` */
   void gradient(const Evaluation &e, double *f, Gradient &G) const;
 
 private:
   struct Piece {
     UserFunction f;
-    int          first; /* of its arguments */
+    int          first; /* number of its first argument in `arguments` */
   };
-  std::string        name_; /* "variable speed", for messages */
+  std::string        name_; /* such as "variable speed", for messages */
   std::vector<Piece> pieces_;
 
   void read(const Evaluation &e, const Piece &p, double *m) const;
@@ -42,7 +42,7 @@ public:
   enum Kind { Definition, RateOfState };
 
   explicit ExpressionBatch(const Bodies &b) : bodies_(b) {}
-  /* rows of a group of unknowns of this rank */
+  /* Adds the rows of one group of this rank's unknowns, from local number `local` on */
   void add(Kind kind, LocalFunction f, PetscInt local, PetscInt group)
   {
     all_.push_back({kind, std::move(f), local, group});

@@ -1,6 +1,7 @@
 /*
-  Unknowns that another library adds to a scene: coordinates, with their own mass and forces, and holonomic constraints between them and
-  bodies. Each rank has a part of them; their numbers follow those of the scene's own unknowns on the rank.
+  An extension is a set of unknowns that another library adds to a scene, such as the nodes of a whole finite-element body:
+  coordinates, with their mass and forces, and multipliers of holonomic constraints between these coordinates and bodies. Each
+  rank has a part of the unknowns, whose numbers follow those of the scene's own unknowns on the rank.
 */
 #ifndef HHTDAE_SCENE_EXTENSION_H
 #define HHTDAE_SCENE_EXTENSION_H
@@ -16,13 +17,14 @@ class Extension
 {
 public:
   virtual ~Extension()                        = default;
-  virtual PetscInt coordinates() const        = 0; /* of this rank */
-  virtual PetscInt multipliers() const                                                        = 0; /* of this rank, numbered after its coordinates; their rows are holonomic constraints */
-  virtual void     initial(double *u, double *v) const = 0; /* own coordinates */
+  virtual PetscInt coordinates() const        = 0; /* number on this rank */
+  /* number on this rank; numbered after the coordinates; their rows are holonomic constraints */
+  virtual PetscInt multipliers() const                                                        = 0;
+  virtual void     initial(double *u, double *v) const = 0; /* initial coordinates and velocities of this rank */
   virtual void     startFrom(const double *u, const double *v)                                = 0; /* sets the initial coordinates and velocities */
   virtual void     localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
-  virtual bool     vectors() const { return false; } /* coordinates are consecutive triples, vectors in space axes */
-  /* The mesh that a page shows, of at most most_nodes nodes; null if the shape is not known. Collective */
+  virtual bool     vectors() const { return false; } /* whether each three consecutive coordinates are a vector in space axes */
+  /* The mesh that a page (output/page.cpp) shows, with at most most_nodes nodes; null if the shape is not known. Collective */
   virtual PetscErrorCode pageMesh(std::size_t most_nodes, std::unique_ptr<PageMesh> *) const
   {
     (void)most_nodes;

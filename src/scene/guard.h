@@ -1,4 +1,4 @@
-/* Users' functions may throw: exceptions become error codes before they reach PETSc, which is written in C. */
+/* Users' functions may throw. Exceptions are converted to PETSc's error codes, since they must not pass through PETSc's C functions. */
 #ifndef HHTDAE_SCENE_GUARD_H
 #define HHTDAE_SCENE_GUARD_H
 
@@ -19,8 +19,9 @@ template <class Call> PetscErrorCode Guarded(Call call)
   }
 }
 
-/* Raises an error of one rank, with its text, on all ranks: a user's function may fail only on the owner of its body, for which the others would
-   wait for ever. Collective; on one rank it costs nothing. Test: Ranks.test_errors_of_one_rank of test_parallel.py. */
+/* Raises an error of one rank, with its text, on all ranks. A user's function may fail on one rank only, and the others
+   would wait forever in their next collective call. Collective; on one rank it costs nothing. Test:
+   Ranks.test_errors_of_one_rank of test_parallel.py. */
 inline PetscErrorCode OnAllRanks(MPI_Comm comm, PetscErrorCode code)
 {
   PetscMPIInt size, rank, mine, first;

@@ -8,14 +8,16 @@
 namespace hhtdae
 {
 
-constexpr int measured_coordinates = 3 * max_coordinates; /* of the bodies of i, j and frame */
+constexpr int measured_coordinates = 3 * max_coordinates; /* largest number of coordinates of the bodies of i, j and frame together */
 using MeasureDual                  = Dual<measured_coordinates>;
 
-/* accelerations: whether to compute them; else they are zero */
+/* The motion of a local marker; its accelerations are zero unless `accelerations` is set */
 MarkerMotion<double> MotionOfMarker(const Evaluation &e, PetscInt marker, bool accelerations);
 
-/* Derivative directions first + c: coordinate c with its rate and acceleration, du = 1, du' = sv, du'' = sa. For frames of attachments only the derivative by their position (order 0),
-   velocity (1) or acceleration (2); other bodies have derivatives in order 0 only. */
+/* The motion with derivatives. Direction first + c perturbs coordinate c of the body together with its velocity and
+   acceleration, du = 1, du' = sv, du'' = sa. Markers on attachments' frames have derivatives by the frame's position
+   (order 0), velocity (1) or acceleration (2) instead, one order per call; other markers have derivatives for order 0
+   only. */
 MarkerMotion<MeasureDual> MotionOfMarker(const Evaluation &e, PetscInt marker, int first, int order);
 
 } // namespace hhtdae

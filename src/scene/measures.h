@@ -1,8 +1,8 @@
 /*
-  Measures in terms of this rank's local unknowns: values, and derivatives by the unknowns on which they depend.
+  Measures as functions of this rank's local unknowns: values, and derivatives by the unknowns on which they depend.
 
-    LocalMeasure m = PlaceMeasure(localizer, Measure::distance(a, b));   during the layout, on the rank that evaluates it
-    double       x = MeasureValue(m, evaluation);                        after the bodies have been moved to this state
+    LocalMeasure m = PlaceMeasure(localizer, Measure::distance(a, b));   during the layout, on the rank that evaluates the measure
+    double       x = MeasureValue(m, evaluation);                        after the bodies have been moved to the state of the evaluation
 */
 #ifndef HHTDAE_SCENE_MEASURES_H
 #define HHTDAE_SCENE_MEASURES_H
@@ -18,10 +18,10 @@ namespace hhtdae
 struct LocalMeasure {
   Measure::Kind                       kind      = Measure::Time;
   int                                 component = 0;
-  PetscInt                            i = -1, j = -1, frame = -1; /* local markers; -1: the space origin, space axes */
-  Input                               input;                      /* a scalar unknown */
-  double                              angle = 0;                  /* over full turns, at the last accepted step */
-  PetscInt                            of[2] = {-1, -1};           /* the scene's numbers of the markers of an angle */
+  PetscInt                            i = -1, j = -1, frame = -1; /* local markers; -1 for i and j: the origin of space; -1 for frame: space axes */
+  Input                               input;                      /* the scalar unknown, for measures that are one */
+  double                              angle = 0;                  /* rad, with full turns, at the last accepted step */
+  PetscInt                            of[2] = {-1, -1};           /* for an angle: numbers of its markers in the scene */
   std::vector<std::unique_ptr<Probe>> probes;
 
   void     accept(const Bodies &B);
@@ -36,13 +36,13 @@ struct LocalMeasure {
   void     copyMemory(double *x, bool in);
 };
 
-/* Requests unknowns of other ranks through the localizer, in both of its passes. Kinetic and potential energy need no unknowns here: they are those of the
-   whole scene. */
+/* Requests the needed unknowns of other ranks through the localizer, in both of its passes. Kinetic and potential energy
+   request none: they are sums over the whole scene, which all ranks compute together. */
 LocalMeasure PlaceMeasure(Localizer &l, const Measure &m);
 
 double MeasureValue(const LocalMeasure &m, const Evaluation &e);
 
-/* The part of an element that contains row or component `row`, which is changed to its number in the part; null if there is none */
+/* The part of an element that contains row or component `row`; `row` becomes its number in that part. Null if there is no such part */
 const Part *FindPart(const SceneData &s, PetscInt element, bool constraint, PetscInt &row);
 
 bool NeedsAcceleration(const Measure &m);
@@ -50,11 +50,11 @@ bool NeedsAcceleration(const Measure &m);
 bool FollowsFromEquations(const SceneData &s, const Measure &m);
 bool NeedsAcceleration(const Expression &f);
 
-/* Error of a measure as text, empty if there is none; in_equation: it is an argument of an expression, which needs its
- * derivatives */
+/* What is wrong with a measure, as text; empty if nothing. in_equation: whether the measure is an argument of an
+   expression in the equations, which need its derivatives */
 std::string CheckMeasure(const SceneData &s, const Measure &m, bool in_equation);
 const char *NameOf(Measure::Kind k); /* "angular velocity" */
-/* who: "variable speed"; adds the errors of an expression */
+/* Adds the errors of an expression. who: its owner in messages, such as "variable speed" */
 void CheckExpression(const SceneData &s, const std::string &who, const Expression &e, std::vector<std::string> &errors);
 /* Adds the errors of variables, states and users' forces */
 void CheckExpressions(const SceneData &s, std::vector<std::string> &errors);
@@ -68,7 +68,7 @@ struct Columns {
   std::vector<Part> parts;
   int               width = 0;
 
-  /* first column of a body, -1 for the ground; column of a scalar, -1 for a dropped multiplier */
+  /* First column of a body, or -1 for the ground; column of a scalar, or -1 for a dropped multiplier */
   int body(const Bodies &B, PetscInt b);
   int scalar(const Pattern &p, const Input &i);
 
@@ -83,12 +83,12 @@ public:
   void place(Localizer &l, const Measure &m) { all_.push_back(PlaceMeasure(l, m)); }
   int  size() const { return (int)all_.size(); }
 
-  /* determines the columns, after all measures have been placed */
+  /* Determines the columns; called after all measures have been placed */
   void           connect(const Bodies &B, const Pattern &p);
   const Columns &columns() const { return columns_; }
 
   double value(int k, const Evaluation &e) const { return MeasureValue(all_[k], e); }
-  /* adds factor times dm/du + sv dm/du' + sa dm/du'' to a row of the width of the columns */
+  /* Adds factor (dm/du + sv dm/du' + sa dm/du'') of measure k to `row`, an array with an entry for each column */
   void addGradient(int k, const Evaluation &e, double factor, double *row) const;
 
   std::vector<LocalMeasure>       &all() { return all_; }
@@ -99,11 +99,11 @@ public:
 private:
   std::vector<LocalMeasure> all_;
   std::vector<std::vector<int>>
-          at_; /* columns of each: bodies of i, j, frame; or a scalar; then, of probes, bodies and multipliers */
+          at_; /* columns of each measure: of the bodies of i, j and frame, or of its scalar; then those of its probes' bodies and multipliers */
   Columns columns_;
 };
 
-/* A batch that reads measures: implements memory, counted angles and step limits by those of the measures */
+/* A batch that reads measures. Its memory, counted angles and step limits are those of the measures. */
 template <class Base> class ReadingBatch : public Base
 {
 public:

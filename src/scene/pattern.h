@@ -1,7 +1,7 @@
 /*
-  The sparsity pattern by groups of unknowns. The rows of a group (the position of a body, its angles, the rows of a constraint
-  kernel's instance) have the same columns, so that a block of the matrix is given by one offset and one stride, and elements add to the
-  arrays of the matrix without searching.
+  The sparsity pattern in groups of unknowns. The rows of a group (the position of a body, its angles, the rows of an instance of a constraint
+  kernel) have nonzeros in the same columns. So one offset and one stride locate a block in the arrays of the matrix, and elements add to these
+  arrays without searching.
 */
 #ifndef HHTDAE_SCENE_PATTERN_H
 #define HHTDAE_SCENE_PATTERN_H
@@ -13,20 +13,21 @@ namespace hhtdae
 {
 
 struct Group {
-  PetscInt global; /* number of its first unknown */
-  PetscInt local;  /* its number among the local unknowns: own, then other ranks' */
+  PetscInt global; /* global number of the first unknown */
+  PetscInt local;  /* number of the first unknown among the local ones: own, then other ranks' */
   PetscInt size;
   bool     own;
-  PetscInt frame = -1; /* local body, if the group is part of the motion of an attachment's frame; its blocks go to projection.h */
-  int      at    = 0;  /* first column in the frame's motion */
+  PetscInt frame = -1; /* local number of the frame, if the group is part of the motion of an attachment's frame; projection.h handles its blocks */
+  int      at    = 0;  /* first column in the frame's motion (x, theta, v, w, a, alpha) */
 };
 
-/* Position of a block: entry (r, c) is at base + r stride + c in the array of the diagonal part, or of the off-diagonal part of an MPIAIJ matrix */
+/* Position of a block: entry (r, c) is at base + r stride + c in the array of the diagonal part or, if `off`, of the
+   off-diagonal part of an MPIAIJ matrix */
 struct Slot {
   PetscInt base   = -1; /* -1: the rows belong to another rank */
   PetscInt stride = 0;
-  bool     off = false, diagonal = false; /* diagonal: entry (r, r) at base + r stride, no others */
-  bool     frame = false;                 /* a block of an attachment's frame, in the array of the projection */
+  bool     off = false, diagonal = false; /* diagonal: only entries (r, r) are stored, at base + r stride */
+  bool     frame = false;                 /* the block belongs to an attachment's frame and is in the array of the projection */
 
   Slot column(PetscInt c) const { return {base < 0 ? base : base + c, stride, off, diagonal, frame}; }
 };
@@ -46,16 +47,17 @@ public:
     group.push_back({-1, -1, 3, false, frame, at});
     return (PetscInt)group.size() - 1;
   }
-  /* requests a block and returns the number of its slot, which is known after build(). Group -1: no block, adding to its slot does nothing */
+  /* Requests a block and returns the number of its slot; slot() returns the slot after build(). With column = -1 there is
+     no block, and adding to the slot does nothing */
   PetscInt need(PetscInt row, PetscInt column, bool diagonal = false)
   {
     request_.push_back({column < 0 ? -1 : row, column, diagonal});
     return (PetscInt)request_.size() - 1;
   }
-  /* entries that no element requests are not stored, even on the diagonal: multipliers have none */
+  /* Entries that no element requests are not stored. Rows of multipliers have no entry on the diagonal. */
   void build(PetscInt start, PetscInt n);
   Slot slot(PetscInt number) const { return slot_[number]; }
-  /* calls f(number, row, column) for all requested blocks of attachments' frames; put() sets the slot of such a block, after build() */
+  /* Calls f(number, row, column) for all requested blocks of attachments' frames; put() sets the slot of such a block, after build() */
   template <class F> void ofFrames(F f) const
   {
     for (std::size_t q = 0; q < request_.size(); q++)
@@ -64,10 +66,10 @@ public:
   void put(PetscInt number, const Slot &s) { slot_[number] = s; }
   void release(); /* frees everything but the groups */
 
-  /* rows i of the diagonal part (columns from `start`) and of the off-diagonal part (global columns) */
+  /* CSR arrays of the diagonal part (columns relative to `start`) and of the off-diagonal part (global columns) */
   std::vector<PetscInt> di, dj, oi, oj;
 
-  /* SEQAIJ or MPIAIJ with this pattern; other types get it through MatConvert by the caller */
+  /* Creates a SEQAIJ or MPIAIJ matrix with this pattern; for other types the caller converts it with MatConvert() */
   PetscErrorCode createMat(MPI_Comm comm, PetscInt n, Mat *A) const;
 
 private:
@@ -82,9 +84,9 @@ private:
 
 /* Adds blocks to the arrays of a matrix */
 struct Sink {
-  double *diagonal, *off, *frame = nullptr; /* of the matrix, of the projection */
+  double *diagonal, *off, *frame = nullptr; /* arrays of the diagonal and off-diagonal part of the matrix, and of the projection */
 
-  /* rows, columns: of the block at (0, 0) of B; blocks of three columns are the common ones */
+  /* Adds the leading rows x columns entries of B. Most blocks have three columns: these have a loop of fixed length */
   template <class Block> void add(const Slot &s, const Block &B, int rows, int columns) const
   {
     if (s.base < 0) return;

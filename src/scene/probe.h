@@ -1,7 +1,7 @@
 /*
-  Probes read a joint or force for measures: the loads of a constraint on the bodies of its markers, the
-  components of a force without force states. A probe is a copy of the instance, so that any rank that has its bodies and multipliers
-  can evaluate it.
+  A probe evaluates a joint or force for measures: the loads of a constraint on the bodies of its markers, or the components
+  of a force that are not force states. It is a copy of the instance, so that any rank with local copies of the element's
+  bodies and multipliers can evaluate it.
 */
 #ifndef HHTDAE_SCENE_PROBE_H
 #define HHTDAE_SCENE_PROBE_H
@@ -20,21 +20,23 @@ public:
   virtual int      markers() const     = 0;
   virtual PetscInt marker(int k) const = 0; /* local number */
 
-  /* of a constraint: the load - J^T lambda on the bodies of its markers; its multipliers */
+  /* Of a constraint: the load - J^T lambda on the bodies of its markers; the number of its multipliers, dropped ones not
+     counted; the i-th multiplier */
   virtual void  reaction(const Evaluation &, Wrench<double> *) const {}
   virtual int   multipliers() const { return 0; }
   virtual Input multiplier(int) const { return {}; }
-  /* derivatives of y . reaction, y constant, all wrenches as one vector: by the frames' perturbations (6 per marker) and
-     by the multipliers. Reactions of kernels with inputs do not depend on the inputs. */
+  /* Derivatives of y . reaction for constant y, with the wrenches of all markers stacked as one vector: by perturbations
+     of the frames (6 per marker) and by the multipliers. Reactions of kernels with inputs do not depend on the inputs. */
   virtual void reactionGradient(const Evaluation &, const double *, double *, double *) const {}
 
-  /* All rows, also dropped ones, in the state of e, values at velocity level being Psi; speed: sum of the magnitudes of the terms of Psi */
+  /* Computes all rows, including dropped ones, in the state of the evaluation. At velocity level DescribedRows::value is
+     Psi, and speed is the sum of the magnitudes of its terms. */
   virtual void rows(const Evaluation &, DescribedRows &, double *speed) const { (void)speed; }
 
-  /* of a force */
+  /* Of a force: its components, computed even if they are force states */
   virtual void components(const Evaluation &, double *) const {}
 
-  /* of both: loads on the bodies of the markers */
+  /* Of both: loads on the bodies of the markers */
   virtual void loads(const Evaluation &, Wrench<double> *on) const
   {
     for (int k = 0; k < markers(); k++) on[k] = {Vector3::Zero(), Vector3::Zero()};
@@ -126,7 +128,7 @@ public:
   }
 
 private:
-  int row_[R], rows_ = 0; /* that are not redundant */
+  int row_[R], rows_ = 0; /* the rows that were not dropped, and their number */
 
   void value(const Frame<double> *f, const Twist<double> *w, double t, const double *z, double *psi) const
   {

@@ -1,4 +1,5 @@
-/* The described instances of one kernel; localize() makes the batches of those that a rank needs. Included by scene_data.h. */
+/* A store has the instances of one kernel in the description; localize() makes batches of the instances that a rank
+   needs. Included by scene_data.h. */
 #ifndef HHTDAE_SCENE_STORE_H
 #define HHTDAE_SCENE_STORE_H
 
@@ -13,12 +14,12 @@ namespace hhtdae
 
 struct Runtime;
 
-/* Translates markers and unknowns of an instance to this rank's numbers; layout.cpp */
+/* Translates global numbers of markers and unknowns to this rank's local numbers; layout.cpp */
 class Localizer
 {
 public:
   virtual ~Localizer() = default;
-  virtual bool     needed(const StoreBase &s, PetscInt e) const = 0; /* the instance belongs to this rank or acts on its bodies */
+  virtual bool     needed(const StoreBase &s, PetscInt e) const = 0; /* whether the instance belongs to this rank or acts on one of its bodies */
   virtual PetscInt marker(PetscInt id)                          = 0;
   virtual PetscInt group(PetscInt global, PetscInt size)        = 0;
   virtual PetscInt local(PetscInt global) const                 = 0;
@@ -36,26 +37,33 @@ public:
   virtual PetscInt      marker(PetscInt e, int k) const   = 0;
   virtual PetscInt      element(PetscInt e) const         = 0;
   virtual bool          isConstraint() const { return false; }
-  virtual bool          isHolonomic() const { return false; } /* of constraints */
-  virtual bool          loads(int) const { return true; }     /* whether the instance puts a load on the body of its k-th marker; else it only reads its motion */
-  virtual int           rows() const = 0;                     /* of a constraint; components of a force */
-  virtual unsigned char active(PetscInt) const { return 0; }  /* bits of the rows of a constraint that were not dropped */
+  virtual bool          isHolonomic() const { return false; } /* only for constraints */
+  /* whether an instance puts a load on the body of its k-th marker, not only reads its motion */
+  virtual bool          loads(int) const { return true; }
+  virtual int           rows() const = 0;                     /* number of rows of a constraint, or of components of a force */
+  virtual unsigned char active(PetscInt) const { return 0; }  /* bits of the rows of a constraint that were not dropped as redundant */
   virtual void          setActive(PetscInt, unsigned char) {}
-  virtual bool          asForceStates(PetscInt) const { return false; } /* components are unknowns F */
+  virtual bool          asForceStates(PetscInt) const { return false; } /* whether the components of a force are unknowns F */
   virtual bool          usesVelocities() const { return true; }
-  virtual bool          isExplicit() const { return false; }                            /* a constraint of the description that a run satisfies without multipliers: attach.h */
-  virtual bool          neverRedundant() const { return false; }                        /* among dependent rows never drop these, but another element's */
-  virtual bool          hasGeometricStiffness() const { return true; }                  /* d(Phi_q^T lambda)/dq is not zero */
-  virtual bool          drivenAngle(PetscInt, double, double *) const { return false; } /* the angle that a motion prescribes at a time, with full turns; false: none */
-  virtual int           memory() const { return 0; }                                    /* number of values that an instance stores of accepted steps */
-  virtual void          remember(PetscInt, double *) {}                                 /* initial memory of an instance, in place of that of the description */
+  /* whether a run satisfies the constraint by construction, without multipliers: attachments, attach.h */
+  virtual bool          isExplicit() const { return false; }
+  /* whether rows of another element are dropped when rows of this one depend on them */
+  virtual bool          neverRedundant() const { return false; }
+  virtual bool          hasGeometricStiffness() const { return true; }                  /* whether d(Phi_q^T lambda)/dq can be nonzero */
+  /* the angle, with full turns, that a motion prescribes at a time; false if it prescribes none */
+  virtual bool          drivenAngle(PetscInt, double, double *) const { return false; }
+  /* number of values of accepted steps that an instance stores */
+  virtual int           memory() const { return 0; }
+  /* sets the initial memory of an instance; without this call it is that of the description */
+  virtual void          remember(PetscInt, double *) {}
   virtual int           inputs() const { return 0; }
   virtual ScalarRef     input(PetscInt, int) const { return {}; }
   virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
-  virtual void          describe(const SceneData &, PetscInt, double, DescribedRows &) const {} /* rows of a constraint at the described poses */
-  /* a copy of one instance for measures: loads of a constraint, components of a force that are not force states */
+  /* computes the rows of a constraint at the described poses */
+  virtual void          describe(const SceneData &, PetscInt, double, DescribedRows &) const {}
+  /* A copy of one instance, with which measures evaluate the loads of a constraint or the components of a force (probe.h) */
   virtual std::unique_ptr<Probe>         probe(Localizer &l, PetscInt e) const = 0;
-  virtual const std::vector<Expression> *expressions(PetscInt) const { return nullptr; } /* of user's forces */
+  virtual const std::vector<Expression> *expressions(PetscInt) const { return nullptr; } /* expressions of a user's force; null for other elements */
 
   /* number of multipliers or force states of an instance */
   int unknowns(PetscInt e) const
@@ -79,7 +87,7 @@ template <class K> struct Described {
   typename K::Data data;
 };
 
-/* common part of stores of constraints and forces */
+/* Common part of the stores of constraints and forces */
 template <class K> class StoreOf : public StoreBase
 {
 public:
