@@ -1,6 +1,7 @@
 /*
-  Products of matrices of which a size is known at run time alone, by BLAS and as values: an operator that is found within this namespace in place of Eigen's,
-  which compiles kernels of its own for every kind of operand, in every source. BLAS uses what the processor has, whatever flags we were compiled with.
+  operator* for matrices with a size known only at run time: it calls BLAS and returns a matrix instead of an expression.
+  Within this namespace it is found in place of Eigen's, whose templates compile separate code for every combination of
+  operands in every source file. BLAS uses the instructions of the present processor, whatever our compiler flags are.
 */
 #ifndef HHTDAE_SCENE_PRODUCTS_H
 #define HHTDAE_SCENE_PRODUCTS_H
@@ -16,14 +17,14 @@ namespace hhtdae
 namespace product
 {
 
-/* A matrix as it stands in memory, column after column */
+/* A matrix in memory, stored by columns */
 struct Stored {
   const double *entries;
   Eigen::Index  rows, columns, stride;
-  bool          transposed; /* rows and columns are those of the matrix, entries those of its transpose */
+  bool          transposed; /* `entries` are those of the transpose; rows and columns are those of the matrix itself */
 };
 
-/* out = A B, rows of A by columns of B */
+/* out = A B, stored by columns without gaps */
 inline void Of(const Stored &A, const Stored &B, double *out)
 {
   const PetscBLASInt m = (PetscBLASInt)A.rows, n = (PetscBLASInt)B.columns, k = (PetscBLASInt)A.columns;
@@ -33,7 +34,7 @@ inline void Of(const Stored &A, const Stored &B, double *out)
   else std::fill(out, out + m * n, 0.);
 }
 
-/* Matrices, parts with whole columns and transposes of these; products with other expressions remain Eigen's. */
+/* The operator applies to matrices, blocks with contiguous columns, and transposes of these; products with other expressions remain Eigen's. */
 template <class A, class = void> struct Operand {
   static constexpr bool fits = false;
 };

@@ -2,11 +2,13 @@
   Attitude of a body as a function of its three rotational coordinates U: dA = [G dU] A, G the matrix of 3-1-3 Euler angles (euler.h) or, by
   default, the tangent operator of a local rotation vector.
 
-  A local rotation vector x rotates the body from a reference attitude C, A = exp([x]) C, in axes of space. The reference is the attitude
-  at the last accepted state, so that x is the rotation in the present step. It is singular at a full turn, where a step fails and is repeated with a
-  smaller one; step_limit.cpp keeps steps far below. Its velocities and accelerations are the angular velocity w and its derivative, which do not depend on the
-  reference: with x = 0 at the beginning of a step, Newmark's relations are those of the generalized-alpha method on the rotation group, see
-  src/integrator/coordinates/rotations.cpp. The moment equations of a body are multiplied by G^T in both cases, as generalized forces.
+  A local rotation vector x, in space axes, rotates the body from a reference attitude C: A = exp([x]) C. The reference is the
+  attitude at the last accepted state, so that x is the rotation in the present step. G is singular at a full turn;
+  step_limit.cpp keeps the rotation of a step far below that. The velocities and accelerations of these coordinates are the
+  angular velocity w and its derivative, which do not depend on the reference. With x = 0 at the beginning of a step,
+  Newmark's relations are those of the generalized-alpha method on the rotation group, see
+  src/integrator/coordinates/rotations.cpp. The moment equations of a body are multiplied by G^T in both cases, as generalized
+  forces.
 
     exp([x]) = 1 + S1 [x] + S2 [x]^2,    G = 1 + S2 [x] + S3 [x]^2,    w = G x',    S_m(z) = sum (-z)^k/(2k+m)!,  z = |x|^2
 
@@ -20,7 +22,7 @@
 namespace hhtdae
 {
 
-/* S1 to S5 at z, to rounding */
+/* S1 to S5 at z, to machine precision; s[0] is not used */
 struct Stumpff {
   double s[6];
   explicit Stumpff(double z)

@@ -1,4 +1,4 @@
-/* The state of a run that a snapshot has taken, from which it answers queries (query.cpp, query_measures.cpp). */
+/* The state of a run that a snapshot has stored, and from which it answers queries (query.cpp, query_measures.cpp). */
 #ifndef HHTDAE_SCENE_SNAPSHOT_H
 #define HHTDAE_SCENE_SNAPSHOT_H
 
@@ -10,13 +10,13 @@
 namespace hhtdae
 {
 
-/* The data that belong to the unknowns of a state: reference attitudes of rotations, memories of elements, and angles over full turns. The run itself replaces them
-   with every accepted step. */
+/* The data that a state needs besides its unknowns: reference attitudes of rotations, memories of elements, and angles
+   over full turns. The run itself replaces its own with every accepted step. */
 struct Origin {
-  std::vector<Matrix3>      references; /* of this rank's bodies, then of others' */
+  std::vector<Matrix3>      references; /* LocalBody::C of all bodies on this rank */
   std::vector<double>       memories;   /* of all batches; empty if no element has memory */
   std::vector<CountedAngle> counted;
-  long                      accepted_states = 0; /* Runtime::accepted_states at that time */
+  long                      accepted_states = 0; /* Runtime::accepted_states when the data were stored */
 
   void take(Runtime &R)
   {
@@ -29,7 +29,7 @@ struct Origin {
   }
 };
 
-/* The run has the references and memories of an Origin during the lifetime of this object */
+/* During the lifetime of this object the run has the references and memories of an Origin */
 class CountFrom
 {
 public:
@@ -49,7 +49,7 @@ public:
 private:
   Runtime            &R_;
   Origin             &origin_;
-  std::vector<double> now_; /* memories of the run */
+  std::vector<double> now_; /* memories of the run, restored by the destructor */
 
   void exchange()
   {
@@ -66,7 +66,7 @@ struct Snapshot::Work {
   Origin              origin;
 
   Evaluation at() const { return Evaluation{t, u.data(), v.data(), a.data(), R->bodies, R->n}; }
-  /* Moves the bodies to this state unless they are there */
+  /* Moves the bodies to this state unless they already are at it */
   void move()
   {
     if (moved == R->bodies.moves) return;
@@ -77,7 +77,7 @@ struct Snapshot::Work {
   const SceneData &scene() const { return R->scene; }
   PetscMPIInt      owner(PetscInt body) const { return R->number.owner.empty() ? 0 : R->number.owner[body]; }
 
-  /* Errors if a body or element was described after the run was made */
+  /* An error if the body or element was described after the run was made */
   PetscErrorCode hasBody(PetscInt body) const;
   PetscErrorCode hasElement(PetscInt element) const;
   PetscErrorCode load(PetscInt element, PetscInt on, Load *x);
@@ -88,7 +88,7 @@ struct Snapshot::Work {
   PetscErrorCode angle(PetscInt i, PetscInt j, double *x);
 };
 
-/* Numbers that the owner computes and sends to all ranks; an error there is an error on all ranks */
+/* Computes n numbers on the owner and sends them to all ranks; an error on the owner is raised on all ranks */
 template <class F> PetscErrorCode FromOwner(const Runtime &R, PetscMPIInt owner, double *x, int n, const F &compute)
 {
   std::vector<double> all(n + 1, 0);

@@ -14,44 +14,47 @@ PetscErrorCode DeclareSceneOptions(); /* option_names.cpp */
 PetscErrorCode ReadStartOptions(SceneData &s);
 PetscErrorCode ViewStart(const SceneData &s, PetscViewer viewer);
 struct Runtime;
-/* kept.cpp: an error that names the ranks whose description differs from that of rank 0. Collective; to be called before any other collective work on the description */
+/* kept.cpp: an error that names the ranks whose description differs from that of rank 0. Collective; called before any
+   other collective work on the description */
 PetscErrorCode CompareDescriptions(const SceneData &s, PetscMPIInt size);
 PetscErrorCode CheckSame(const Runtime &R, TS ts);                              /* an error if time, final time or tolerances of a run differ between ranks */
 PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer); /* view.cpp; R: a run of it, or null */
 
 /* ---- rows.cpp: all constraints at the described poses ---- */
 
-/* The rows of one kernel instance. Columns: velocity of the centre of mass and angular velocity in space axes, of the movable bodies and as far as their kind has them */
+/* The rows of one kernel instance. The columns of J are the directions of motion, Directions(), of the movable bodies:
+   velocity of the centre of mass and angular velocity in space axes */
 struct RowBlock {
   StoreBase            *store;
   PetscInt              instance, element;
-  int                   first; /* its first row among the element's */
+  int                   first; /* number of its first row among the element's rows */
   int                   rows;
   unsigned char         active;
   const char           *name;
   bool                  length, holonomic;
   std::vector<PetscInt> body;
-  std::vector<int>      column; /* first column of each body in J, and the number of columns */
+  std::vector<int>      column; /* first column of each body in J; the last entry is the number of columns */
   Eigen::MatrixXd       J;
-  Eigen::VectorXd       value, rate, speed; /* Phi, Phi_t (Psi at rest), Phi_q q' + Phi_t (Psi) */
+  Eigen::VectorXd       value, rate, speed; /* Phi, Phi_t, Phi_q q' + Phi_t; at velocity level 0, Psi at rest, Psi */
 
   bool has(int r) const { return active >> r & 1; }
 };
-/* Bodies that cannot move: none; frames at nodes of extensions; these and bodies with fixed_start */
+/* Bodies that must not be moved: none; frames at nodes of extensions; these frames and bodies with fixed_start */
 enum class FixedBodies { None, Nodes, FixedStart };
-/* Whether a body's columns end with its modal coordinates */
+/* Whether a body's columns include its modal coordinates, after the others */
 enum class ModalColumns { None, Included };
 
 std::vector<RowBlock> DescribeAll(const SceneData &s, double t, FixedBodies fixed_bodies, ModalColumns modes = ModalColumns::None);
 double                SceneSize(const SceneData &s); /* diagonal of the box around bodies and markers */
-double                MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks); /* of the largest group of bodies that these rows connect, with the markers */
+/* size of the largest group of bodies that these rows connect, including the markers of the rows */
+double                MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks);
 std::string           RowName(const SceneData &s, PetscInt element, int row, const char *kernel);
 
-/* Directions of motion of a body: indices among (v, w) */
+/* Directions of motion of a body, as indices into (v, w) */
 const std::vector<int> &Directions(BodyKind k);
 int                     Width(const SceneData &s, PetscInt body); /* number of a body's directions of motion and modal coordinates */
 
-/* ---- nearest.cpp: Phi_q M^-1 Phi_q^T, rows distributed by the owners of the elements; the structure of the blocks must be
+/* ---- nearest.cpp: solves systems with Phi_q M^-1 Phi_q^T. The owner of an element owns its rows. The structure of the blocks must be
  * the same in all calls ---- */
 class NearestSystem
 {
@@ -60,15 +63,15 @@ public:
   ~NearestSystem();
   NearestSystem(const NearestSystem &) = delete;
   PetscErrorCode factor(const std::vector<RowBlock> &blocks);
-  /* d: 6 numbers per body, the smallest change in the metric of the masses with Phi_q d = rhs (rows in the order of the blocks),
-     or, unless `from` is null, the one nearest to `from` */
+  /* d: the change of poses or velocities, 6 numbers per body, that satisfies Phi_q d = rhs (rows in the order of the
+     blocks) and is, in the metric of the masses, the smallest one or, unless `from` is null, the nearest one to `from` */
   PetscErrorCode             solve(const std::vector<RowBlock> &blocks, const std::vector<double> &rhs,
                                    const std::vector<double> *from, std::vector<double> &d);
   const std::vector<double> &weights() const { return weight_; } /* diagonal of Phi_q M^-1 Phi_q^T */
 
 private:
   Model                &M;
-  std::vector<PetscInt> row_; /* first unknown of blocks */
+  std::vector<PetscInt> row_; /* number of the first row of each block */
   std::vector<double>   weight_;
   PetscInt              n_ = 0, start_ = 0;
   Mat                   S_   = nullptr;
@@ -89,23 +92,28 @@ struct Pose {
 std::vector<Pose> Poses(const SceneData &s);
 void              SetPoses(SceneData &s, const std::vector<Pose> &p);
 PetscErrorCode    ReportMoves(SceneData &s, const std::vector<Pose> &before, const char *what);
-/* moves bodies rigidly to satisfy the constraints of all elements, or of those marked in `elements`; ok: within the tolerance */
+/* moves bodies rigidly to satisfy the constraints of all elements, or only of those marked in `elements`; ok: whether
+   they are satisfied within the tolerance */
 PetscErrorCode    ProjectPositions(Model &M, FixedBodies fixed_bodies, bool *ok, const std::vector<char> *elements = nullptr);
-PetscErrorCode    Assemble(Model &M);                                          /* reports or projects, by StartPolicy::assembly */
+/* reports violations or projects the positions, as StartPolicy::assembly says */
+PetscErrorCode    Assemble(Model &M);
 std::vector<char> RigidElements(const SceneData &s, FixedBodies fixed_bodies); /* marks elements that only rigid motions can satisfy */
-bool              LeftToDeform(const SceneData &s);                            /* Assemble() has left violations that need deformations of flexible bodies: the run's first state is to be projected */
+/* whether Assemble() has left violations that only deformations of flexible bodies can remove, so that the run's first
+   state has to be projected */
+bool              LeftToDeform(const SceneData &s);
 
 /* ---- redundancy.cpp ---- */
 PetscErrorCode DropRedundant(Model &M);
 
 /* ---- inertia.cpp: bodies without mass or moments of inertia ---- */
 void           FillLight(SceneData &s);          /* BodyData::light_mass, light_inertia */
-PetscErrorCode CheckInertia(const SceneData &s); /* movements without inertia must be determined by the constraints */
+PetscErrorCode CheckInertia(const SceneData &s); /* an error unless the constraints determine all movements without inertia */
 
-/* ---- equilibrium.cpp: after Number(), with a layout of its own ---- */
+/* ---- equilibrium.cpp: called after Number(); makes a Runtime of its own ---- */
 PetscErrorCode FindEquilibrium(const std::shared_ptr<Model> &M);
 
-/* ---- state.cpp: poses, velocities, deformations, variables and states of a run become the initial ones; V null: at rest ---- */
+/* ---- state.cpp: poses, velocities, deformations, variables and states of a run become the initial values of M; V null:
+   all velocities are zero ---- */
 PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V);
 
 } // namespace hhtdae

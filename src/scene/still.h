@@ -12,10 +12,12 @@
 namespace hhtdae
 {
 
-/* Maximum norms of a residual. force: of the equations of motion, moments divided by the scene's size; body: where it is, -1: not on a body of the scene */
+/* Maximum norms of parts of a residual. force: equations of motion, with moments divided by the scene's size; body: the
+   body with this force, -1 if it is on no body of the scene */
 struct Unbalanced {
-  double   force = 0, misfit = 0, other = 0; /* misfit: of holonomic constraints; other: of constraints at velocity level, variables, force states and states */
-  double   step = INFINITY;                  /* length of the last step: radians, parts of the scene's size */
+  /* misfit: holonomic constraints; other: constraints at velocity level, variables, force states and states */
+  double   force = 0, misfit = 0, other = 0;
+  double   step = INFINITY;                  /* length of the last Newton step: radians, or parts of the scene's size */
   PetscInt body = -1;
 };
 
@@ -27,7 +29,7 @@ struct StillSystem {
   Vec      U = nullptr, V = nullptr, A = nullptr, zero = nullptr, F = nullptr, d = nullptr, next = nullptr;
   Mat      J   = nullptr;
   KSP      ksp = nullptr;
-  std::vector<PetscInt> unread; /* own rows of states that no equation reads: measure() leaves them out, since equilibrium does not depend on them */
+  std::vector<PetscInt> unread; /* own rows of states that no equation reads; measure() ignores them, since equilibrium does not depend on them */
 
   StillSystem(Runtime &r, double time);
   ~StillSystem();

@@ -1,4 +1,4 @@
-/* Eigenvalues of symmetric matrices in ascending order, and their vectors, by LAPACK: Eigen's solver takes seconds to compile. */
+/* Eigenvalues of symmetric matrices, in ascending order, and their eigenvectors, by LAPACK: Eigen's solver takes seconds to compile. */
 #ifndef HHTDAE_SCENE_SYMMETRIC_H
 #define HHTDAE_SCENE_SYMMETRIC_H
 
@@ -13,9 +13,9 @@ namespace hhtdae
 struct SymmetricEigen {
   Eigen::VectorXd values;
   Eigen::MatrixXd vectors;
-  bool            found; /* not where entries are no numbers; values and vectors are none then */
+  bool            found; /* false if entries of A are not finite or LAPACK fails; values and vectors are then NaN */
 
-  /* The lower triangle of A is read. */
+  /* Reads the lower triangle of A only */
   explicit SymmetricEigen(const Eigen::MatrixXd &A) : values(A.rows()), vectors(A), found(true)
   {
     PetscBLASInt    n = (PetscBLASInt)A.rows(), size = std::max<PetscBLASInt>(1, 34 * n), info = 0;

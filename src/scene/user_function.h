@@ -1,4 +1,4 @@
-/* A function that the user gives, of plain numbers: values and derivatives, with its name in what it throws. */
+/* Values and derivatives of a user's function for plain numbers as arguments; exceptions that it throws contain its name. */
 #ifndef HHTDAE_SCENE_USER_FUNCTION_H
 #define HHTDAE_SCENE_USER_FUNCTION_H
 
@@ -17,11 +17,11 @@ public:
   int    arguments() const { return count_; }
   double value(const double *m) const;
   double gradient(const double *m, double *g) const; /* returns the value */
-  /* second derivatives, symmetric, row by row: central differences of the gradient over `reach` of each argument */
+  /* H: second derivatives, a symmetric matrix, by central differences of the gradient; reach: step of the difference for each argument */
   void   curvature(const double *m, const double *reach, double *H) const;
 
 private:
-  std::string                name_; /* "variable speed", for messages */
+  std::string                name_; /* such as "variable speed", for messages */
   RealFunction<const Real *> f_;
   int                        count_ = 0;
 
