@@ -18,14 +18,17 @@ namespace
 {
 
 constexpr int    assembly_iterations = 100, max_named = 10;
-constexpr double max_iteration_turn = 0.3, max_iteration_move = 0.3; /* in one iteration: radians, parts of the scene's size */
+/* largest rotation (rad) and displacement (part of the scene's size) in one iteration */
+constexpr double max_iteration_turn = 0.3, max_iteration_move = 0.3;
 
-/* Violation of an element's constraints at position and velocity level: Euclidean norms in the units of its rows, and relative to the size and speed of the mechanism */
+/* Violation of an element's constraints at position and velocity level: Euclidean norms in the units of the rows, and the
+   same relative to the size and speed of the mechanism */
 struct Misfit {
   double position = 0, velocity = 0, relative_position = 0, relative_velocity = 0;
 };
 
-/* Largest speed of a body or motion, rotations times size, to which violations at velocity level are related; 0 if it is rounding */
+/* Largest speed of a body or motion, with angular velocities multiplied by `size`; violations at velocity level are
+   relative to it. 0 if all speeds are rounding */
 double Speed(const SceneData &s, const std::vector<RowBlock> &blocks, double size)
 {
   double speed = 0;
@@ -54,7 +57,7 @@ std::vector<Misfit> Misfits(const SceneData &s, const std::vector<RowBlock> &blo
   return all;
 }
 
-/* Maximum; NaN if a value is NaN */
+/* Maximum of a member over all elements; NaN if a value is NaN */
 double Largest(const std::vector<Misfit> &m, double Misfit::*of)
 {
   double x = 0;
@@ -129,11 +132,12 @@ double ViolationAsLength(const std::vector<RowBlock> &blocks, const std::vector<
   return std::sqrt(sum);
 }
 
-/* Groups of movable bodies connected by joints that contain a flexible body and touch no body held by fixed_start, which a deformation would have to move: number of the group by
-   bodies and elements, -1: in none */
+/* Groups of movable bodies, connected by joints, that contain a flexible body and are not connected to a body with
+   fixed_start, which a deformation of the group could move. body, element: number of the group of each body and element,
+   -1 if it is in none */
 struct Deformable {
   std::vector<PetscInt> body, element;
-  std::vector<char>     deforms, rigid; /* by elements: in such a group, and not */
+  std::vector<char>     deforms, rigid; /* for each element: whether it is in such a group, and whether it is not */
 };
 
 Deformable FindDeformable(const SceneData &s, FixedBodies fixed_bodies)
@@ -245,7 +249,8 @@ PetscErrorCode ReportMoves(SceneData &s, const std::vector<Pose> &before, const 
   PetscFunctionReturn(0);
 }
 
-/* Gauss-Newton iterations: each step is the smallest, in the metric of the masses, that satisfies the linearized constraints; halved until it reduces the violation */
+/* Gauss-Newton iterations. Each step is the smallest one, in the metric of the masses, that satisfies the linearized
+   constraints; it is halved until it reduces the violation */
 PetscErrorCode ProjectPositions(Model &M, FixedBodies fixed_bodies, bool *ok, const std::vector<char> *elements)
 {
   SceneData            &s    = M.scene;
@@ -347,8 +352,9 @@ std::vector<Misfit> OnRigidElements(std::vector<Misfit> m, const Deformable &d)
   return m;
 }
 
-/* Assembly is repeated from poses perturbed at random by this, in radians and parts of the scene's size, if the violation cannot be reduced along the gradient, as when the shafts of a
-   constant velocity joint are a quarter turn apart (SceneAssembly.AQuarterTurnOff) */
+/* Size of a random perturbation of the poses, rad and parts of the scene's size, from which assembly is repeated if the
+   violation cannot be reduced along the gradient, for example when the shafts of a constant velocity joint are a quarter
+   turn apart (SceneAssembly.AQuarterTurnOff) */
 constexpr double perturbation = 1e-3;
 
 void Perturb(SceneData &s, const std::vector<RowBlock> &blocks)
@@ -362,7 +368,8 @@ void Perturb(SceneData &s, const std::vector<RowBlock> &blocks)
     for (PetscInt k : b.body) moves[k] = 1;
   for (std::size_t i = 0; i < s.bodies.size(); i++)
     for (int k : Directions(KindOf(s, s.bodies[i]))) {
-      const double x = uniform(random); /* drawn also for bodies that do not move, so that the others' numbers do not depend on them */
+      /* also drawn for bodies that do not move, so that the random numbers of the other bodies do not depend on these */
+      const double x = uniform(random);
       if (moves[i]) d[6 * i + k] = x * (k < 3 ? size : 1);
     }
   MoveBodiesBy(s, d, perturbation);
@@ -393,13 +400,15 @@ PetscErrorCode AssemblePositions(Model &M, FixedBodies fixed_bodies, const Defor
   PetscFunctionReturn(0);
 }
 
-/* In groups with flexible bodies, initial velocities that rigid motions cannot make consistent are left as given: the start of the run then takes the nearest consistent ones, those after
-   a plastic impact, which excites vibrations. In a run that continues another one this holds for all such groups, since new joints may connect vibrating bodies. */
+/* In groups with flexible bodies, initial velocities that rigid motions cannot make consistent are left as given. The
+   start of the run then computes the nearest consistent velocities, which are those after a plastic impact and excite
+   vibrations. In a run that continues another one no velocities of such groups are changed here, since new joints may
+   connect vibrating bodies. */
 PetscErrorCode AssembleVelocities(Model &M, FixedBodies fixed_bodies, const Deformable &d)
 {
   SceneData          &s = M.scene;
   std::vector<Misfit> m;
-  std::vector<char>   impact(s.bodies.size(), 0); /* by number of the group */
+  std::vector<char>   impact(s.bodies.size(), 0); /* for each group */
   PetscFunctionBegin;
   PetscCall(ProjectVelocities(M, fixed_bodies, &d.rigid));
   if (M.continues) PetscFunctionReturn(0);

@@ -8,13 +8,13 @@ namespace hhtdae
 namespace
 {
 
-/* Frame of a point at s that the modes displace by x and rotate by `turn`, in body axes */
+/* Frame of the point at s after the modes have displaced it by x and rotated it by `turn`, in body axes */
 Frame<double> Deformed(const Vector3 &r, const Matrix3 &A, const Vector3 &s, const Vector3 &x, const SmallTurn &turn)
 {
   return {r + A * (s + x), A * turn.rotation()};
 }
 
-/* Rows x_i - x_e, then the axes' products */
+/* Rows of the attachment: x_i - x_e, then the products of axes that are zero if the axes are parallel */
 void Value(const Frame<double> &e, const Frame<double> &i, double *phi)
 {
   const Frame<double> f[2] = {e, i};
@@ -22,7 +22,7 @@ void Value(const Frame<double> &e, const Frame<double> &i, double *phi)
   Orient::value<double>(Orient::Data(), f, 0, phi + 3);
 }
 
-/* The reaction of an attachment is the sum of the elements' loads on its frame */
+/* The reaction of an attachment equilibrates its massless frame: it follows from the sum of the elements' loads on the frame */
 class AttachProbe : public Probe
 {
 public:
@@ -45,7 +45,7 @@ public:
     load[1] = {-sum.f, -sum.m};
   }
   void reaction(const Evaluation &ev, Wrench<double> *load) const override { loads(ev, load); }
-  /* the multipliers that the rows would have: force in space axes, moment in axes of the frame */
+  /* the multipliers that the rows would have as constraints: force in space axes, moment in axes of the frame */
   void components(const Evaluation &ev, double *c) const override
   {
     const Wrench<double> sum = onFrame(ev);
@@ -112,7 +112,8 @@ void AttachStore::describe(const SceneData &s, PetscInt e, double, DescribedRows
   rows.J.block<3, 3>(0, 0) = -Matrix3::Identity();
   rows.J.block<3, 3>(0, 6) = Matrix3::Identity();
   rows.J.block<3, 12>(3, 0) = J;
-  rows.J.block<3, 3>(0, 3)  = Cross<double>(f[0].x - b.r - b.A * m.s); /* J is by perturbations of the undeformed marker, which moves by dr + theta x s */
+  /* the columns of J belong to perturbations of the undeformed marker, which moves by dr + theta x s */
+  rows.J.block<3, 3>(0, 3)  = Cross<double>(f[0].x - b.r - b.A * m.s);
   rows.modal.resize(6, a.translation.cols());
   rows.modal << -b.A * point.by_modes.topRows<3>(), (J.middleCols<3>(3) * b.A * turn.J()) * point.by_modes.bottomRows<3>();
 }

@@ -85,7 +85,7 @@ void AddGradient(Evaluation &ev, PetscInt marker, const Frame<double> &at, const
   const BodyKind kind = ev.bodies.body[ev.bodies.marker[marker].body].kind;
   if (!Groups(kind)) return;
   const Matrix<R, 6> J(gradient);
-  Matrix<R, 6>       T, S; /* columns of lambda are T^T, rows of Phi are S */
+  Matrix<R, 6>       T, S; /* T^T: columns of lambda; S: rows of Phi */
   const int          n = ev.bodies.columns(marker, at, J, T);
   if (!by_frame) {
     S.leftCols(n) = T.leftCols(n);
@@ -112,7 +112,7 @@ void AddGradient(Evaluation &ev, PetscInt marker, const Frame<double> &at, const
     ev.sink.add(*slot++, T.middleCols(first, size).transpose(), size, rows);
   }
   if (!by_frame || kind != BodyKind::Attached) return;
-  for (int g = 0; g < 2; g++) /* the velocity of an attachment's frame has columns of its own */
+  for (int g = 0; g < 2; g++) /* the velocity of an attachment's frame has separate columns */
     if (Reach(used, kind, g)) ev.sink.add(*slot++, T.template middleCols<3>(3 * g), rows, 3);
 }
 template void AddGradient<1>(Evaluation &, PetscInt, const Frame<double> &, const double *, const double *, unsigned, unsigned, const Slot *&);

@@ -184,7 +184,7 @@ void Bodies::residual(const double *u, const double *v, const double *a, double 
     for (int c = 0; c < directions; c++) row[c] = k.mass * (acc[c] - gravity(c)) - b.f(c);
     if (k.kind == BodyKind::Planar) row[2] = k.J(2, 2) * acc[2] - b.m(2);
     if (k.kind != BodyKind::Rigid) continue;
-    /* in body axes, where the inertia is constant */
+    /* N is computed in body axes, in which the inertia is constant */
     const Vector3 wl = b.A.transpose() * b.w, al = b.A.transpose() * angularAcceleration(i, v, a);
     const Vector3 N = b.A * (k.J * al + wl.cross(k.J * wl)) - b.m;
     Eigen::Map<Vector3>(row + 3).noalias() = b.G.transpose() * N;

@@ -32,7 +32,7 @@ Matrix3 SmallTurn::momentGradient(const Vector3 &n) const
          b * (phi.dot(n) * Matrix3::Identity() + phi * n.transpose() - 2 * n * phi.transpose());
 }
 
-/* J(phi) = J(-phi)^T */
+/* Uses J(phi) = J(-phi)^T */
 Matrix3 SmallTurn::rateGradient(const Vector3 &y) const
 {
   SmallTurn back = *this;
@@ -46,7 +46,7 @@ Matrix3 SmallTurn::rate(const Vector3 &c) const
   return as * s * Cross<double>(phi) + a * Cross<double>(c) + bs * s * square() + b * (phi * c.transpose() + c * phi.transpose() - s * Matrix3::Identity());
 }
 
-/* J' c = as (|phi|^2)' phi x c + bs (|phi|^2)' phi x (phi x c) + b c x (phi x c) */
+/* Derivative of J' c = as (|phi|^2)' phi x c + bs (|phi|^2)' phi x (phi x c) + b c x (phi x c) */
 Matrix3 SmallTurn::rateOfRateGradient(const Vector3 &c) const
 {
   const double  s  = 2 * phi.dot(c);
@@ -88,7 +88,7 @@ void Carrier::finish(int modes)
   bend_rate.setZero(modes, 6 * n);
 }
 
-/* Motions less (eta^T B eta)/2, and their derivatives */
+/* Subtracts (eta^T B eta)/2 from the motions and (B eta)^T from their derivatives by the modes */
 void Carrier::bendShapes(const double *eta)
 {
   const Eigen::Map<const Eigen::VectorXd> x(eta, modes_);
@@ -151,7 +151,7 @@ void Carrier::stiffen(Eigen::MatrixXd &K) const
     if (stiffening_[k]) K += load_(k) * *stiffening_[k];
 }
 
-/* of one motion: shapes^T eta'' - eta'^T B eta' */
+/* Second time derivative of xi (part 0) or phi (part 1) of attachment k: shapes^T eta'' - eta'^T B eta' */
 Vector3 Carrier::secondOf(const double *v, const double *a, int k, int part) const
 {
   const Eigen::Map<const Eigen::VectorXd> rate(v, modes_), acceleration(a, modes_);
@@ -173,7 +173,8 @@ void Carrier::acceleration(const Bodies &B, int k, const double *v, const double
   angular               = alpha + b.w.cross(f.spin) + b.A * (f.turn.J() * phi + f.turn.rate(turning) * turning);
 }
 
-/* Of a = a_b + alpha_b x e + w_b x (w_b x e) + 2 w_b x (A xi') + A xi'' and alpha = alpha_b + w_b x (A J phi') + A (J phi'' + J' phi') */
+/* Derivatives of a = a_b + alpha_b x e + w_b x (w_b x e) + 2 w_b x (A xi') + A xi'' and alpha = alpha_b + w_b x (A J
+   phi') + A (J phi'' + J' phi'), where e is Attached::arm and the index b stands for the body */
 void Carrier::linearizeAcceleration(const Bodies &B, int k, const double *v, const double *a, double sv, double sa)
 {
   const BodyMotion             &b     = B.now[body];
@@ -188,7 +189,7 @@ void Carrier::linearizeAcceleration(const Bodies &B, int k, const double *v, con
   g.angles[4] = -E * by.alpha - (Cross<double>(Vector3(b.w.cross(f.arm))) + W * E + 2 * V) * by.w -
                 (Cross<double>(alpha) * E + W * W * E + 2 * W * V + Cross<double>(Vector3(b.A * xi))) * by.G;
   g.angles[5] = by.alpha - S * by.w - (W * S + Cross<double>(Vector3(b.A * (J * phi + dJ * c)))) * by.G;
-  /* by the motions, their rates, their second rates */
+  /* derivatives by xi or phi, its rate and its second rate */
   const Matrix3 x[3]     = {(Cross<double>(alpha) + W * W) * b.A, 2 * W * b.A, b.A};
   const Matrix3 theta[3] = {W * b.A * D + b.A * (f.turn.rateGradient(phi) + f.turn.rateOfRateGradient(c)), W * b.A * J + b.A * (D + dJ), b.A * J};
   for (int part = 0; part < 2; part++) {

@@ -13,7 +13,9 @@ namespace hhtdae
 namespace
 {
 
-constexpr double angle_tolerance = 1e-8; /* of lengths, velocities and axes that must be exactly zero, unit or parallel, in their units: rounding of the description */
+/* rounding of the description: allowed deviation of lengths, velocities and axes that must be exactly zero, unit or
+   parallel, each in its unit */
+constexpr double angle_tolerance = 1e-8;
 
 std::string Text(const Vector3 &x) { return Show(x(0)) + ", " + Show(x(1)) + ", " + Show(x(2)); }
 
@@ -87,7 +89,7 @@ private:
                      "are about the centre of mass");
   }
 
-  /* bodies of planar scenes */
+  /* Requires that a body of a planar scene lies and moves in the plane */
   void inPlane(const BodyData &b, const std::string &who)
   {
     if (!s_.planar) return;
@@ -102,7 +104,7 @@ private:
   {
     const MarkerData &m = s_.markers[id];
     if (!s_.planar || m.body < -1 || !m.s.allFinite() || !m.R.allFinite())
-      return; /* reported when they were made */
+      return; /* these errors were reported when the marker was made */
     const auto        name = s_.marker_names.find(id);
     const std::string who =
         "marker " + (name == s_.marker_names.end() ? std::to_string(id) + " on " + s_.bodyName(m.body) : name->second);
@@ -114,7 +116,7 @@ private:
 
   void element(const ElementData &e)
   {
-    if (!s_.valid(e.i) || !s_.valid(e.j)) return; /* reported when it was made */
+    if (!s_.valid(e.i) || !s_.valid(e.j)) return; /* reported when the element was made */
     const PetscInt i = s_.markers[e.i.id].body, j = s_.markers[e.j.id].body;
     if (i < -1 || j < -1 || i != j) return;
     const std::string who = std::string(e.type) + " " + e.name;
@@ -198,7 +200,7 @@ bool SameStart(const StartPolicy &a, const StartPolicy &b)
          a.time == b.time && a.rotations == b.rotations && a.angle_tol == b.angle_tol;
 }
 
-/* An error if anything was added since setUp(). How runs start may have changed: setUp() then describes the scene anew. */
+/* An error if anything was added since setUp(). StartPolicy may have changed: setUp() then describes the scene anew. */
 PetscErrorCode CheckUnchanged(const SceneData &s)
 {
   PetscFunctionBegin;

@@ -7,7 +7,7 @@ namespace hhtdae
 namespace
 {
 
-/* derivative by rotations of the body, with the marker at s from the centre of mass: J_theta - J_x [s] */
+/* Derivative by rotations of the body, J_theta - J_x [s], where s is the vector from the centre of mass to the marker */
 template <int R> Matrix<R, 3> About(const Matrix<R, 6> &J, const Vector3 &s)
 {
   Matrix<R, 3> A;
@@ -37,11 +37,11 @@ template <int R> int Bodies::columns(PetscInt m, const Frame<double> &f, const M
     out.col(2)                 = J.col(5) - sy * J.col(0) + sx * J.col(1);
     return 3;
   }
-  case BodyKind::Attached: /* the frame's own x and theta */
+  case BodyKind::Attached: /* derivatives by x and theta of the frame */
     out.template leftCols<3>()  = J.template leftCols<3>();
     out.template rightCols<3>() = About<R>(J, f.x - b.r);
     return 6;
-  case BodyKind::Flexible: /* at its floating frame */
+  case BodyKind::Flexible: /* the marker is fixed to the floating frame */
   case BodyKind::Rigid: /* dx = dr + dtheta x s, dtheta = G dU */
     out.template leftCols<3>()            = J.template leftCols<3>();
     out.template rightCols<3>().noalias() = About<R>(J, f.x - b.r) * b.G;

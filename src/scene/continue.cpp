@@ -23,7 +23,7 @@ bool SameUnknowns(const SceneData &a, const SceneData &b)
   return same;
 }
 
-/* Batches with memory that does not come from elements: of variables, states, channels and users' functions; for elements see CopyElementMemories() */
+/* Batches of variables, states, channels and users' functions that have memory; CopyElementMemories() copies the memory of elements */
 std::vector<Batch *> FunctionsWithMemory(const Runtime &R)
 {
   std::vector<Batch *> all;
@@ -32,7 +32,7 @@ std::vector<Batch *> FunctionsWithMemory(const Runtime &R)
   return all;
 }
 
-/* Number of values that an element stores of accepted steps, and of angles that its expressions read */
+/* Number of values of accepted steps that an element stores, plus the number of angles that its expressions read */
 int Memory(const SceneData &s, std::size_t e)
 {
   int n = 0;
@@ -60,13 +60,13 @@ PetscErrorCode CheckMemories(const SceneData &from, const SceneData &to)
   for (std::size_t e = 0; e < std::max(from.elements.size(), to.elements.size()); e++) {
     const int before = Memory(from, e), after = Memory(to, e);
     if (before == after) continue;
-    const ElementData &of = (before ? from : to).elements[e]; /* in the description that has the memory */
+    const ElementData &of = (before ? from : to).elements[e]; /* taken from the description that has the memory */
     PetscCall(RefuseToContinue(to, std::string(of.type) + " " + of.name + " has"));
   }
   PetscFunctionReturn(0);
 }
 
-/* Copies memories of functions: angles over full turns */
+/* Copies memories of functions, which are angles over full turns */
 PetscErrorCode CopyFunctionMemories(const Runtime &from, Runtime &to)
 {
   const std::vector<Batch *> a = FunctionsWithMemory(from), b = FunctionsWithMemory(to);
@@ -93,7 +93,8 @@ std::vector<Part> PartsWithMemory(const ElementData &e)
   return all;
 }
 
-/* Copies memories of elements, angles over full turns and points on curves, to the description, which assembly uses before there is a run */
+/* Copies memories of elements (angles over full turns and points on curves) to the new description, because assembly uses
+   them before there is a new run */
 PetscErrorCode CopyElementMemories(const Runtime &from, SceneData &to)
 {
   std::vector<double>                           x;
@@ -115,7 +116,7 @@ PetscErrorCode CopyElementMemories(const Runtime &from, SceneData &to)
       into.push_back({b[k].store, b[k].index});
     }
   }
-  /* ranks that have an element have the same memory of it; others take part with -infinity in the maximum */
+  /* Ranks that have an element have the same memory of it; the others contribute -infinity to the maximum */
   if (from.size > 1) {
     for (std::size_t i = 0, at = 0; i < into.size(); at += into[i++].first->memory())
       if (!found[i]) std::fill_n(x.begin() + at, into[i].first->memory(), -std::numeric_limits<double>::infinity());
@@ -178,9 +179,9 @@ PetscErrorCode BeginCopy(TS ts, TSHHT3Start start, TS *copy)
   PetscCall(TSGetTolerances(ts, &atol, nullptr, &rtol, nullptr));
   PetscCall(TSSetTolerances(*copy, atol, nullptr, rtol, nullptr));
   PetscCall(TSSetTime(*copy, t));
-  PetscCall(TSGetMaxTime(ts, &end)); /* the duration of the run, if it has an end, gives the first step its time scale */
+  PetscCall(TSGetMaxTime(ts, &end)); /* the duration of the run, if it has an end, is the time scale of the first step size */
   if (end < PETSC_MAX_REAL / 2 && end > R->scene.start.time) PetscCall(TSSetMaxTime(*copy, t + end - R->scene.start.time));
-  PetscCall(TSSetMaxSteps(*copy, 1)); /* PETSc requires an end */
+  PetscCall(TSSetMaxSteps(*copy, 1)); /* TSStep() requires a maximum time or a maximum number of steps */
   PetscCall(TSHHT3SetStart(*copy, start));
   PetscCall(TSStep(*copy));
   PetscFunctionReturn(0);
@@ -258,7 +259,7 @@ PetscErrorCode PresentState(TS ts, Vec state[3], PetscBool *done)
   PetscFunctionReturn(0);
 }
 
-/* Other TS types have neither accelerations nor a state between steps */
+/* For TS types other than TSHHT3, which provide neither accelerations nor states between steps */
 PetscErrorCode StateOfOtherType(TS ts, PetscReal t, Vec state[3])
 {
   PetscReal now;
@@ -329,14 +330,15 @@ PetscErrorCode ToNearestConsistent(TS ts)
   PetscFunctionBegin;
   PetscCall(TSGetSolution(ts, &U));
   PetscCall(VecDuplicate(U, &A));
-  const PetscErrorCode failed = ProjectByCopy(ts, R, A, &copy); /* A and copy are to be destroyed even if dropped rows are violated there */
+  /* checked only after A and copy are destroyed, since ProjectByCopy() reports violated dropped rows as an error */
+  const PetscErrorCode failed = ProjectByCopy(ts, R, A, &copy);
   PetscCall(VecDestroy(&A));
   PetscCall(TSDestroy(&copy));
   PetscCall(failed);
   PetscFunctionReturn(0);
 }
 
-/* Whether motions move: constraints at velocity level are violated at rest, or holonomic ones change within a small time */
+/* Whether motions move bodies at t: constraints at velocity level are violated at rest, or holonomic constraints change within a short time */
 static PetscErrorCode HasMovingMotions(Runtime &R, double t, Vec U, Vec V, PetscBool *moving)
 {
   const double time_difference = 1e-6 * std::max(1., std::abs(t));
@@ -395,7 +397,7 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
   bool anew = !journal_->parameters.empty();
   if (!anew) {
     PetscCall(setUp());
-    anew = model_ != old->model; /* it was set up with another start */
+    anew = model_ != old->model; /* true if setUp() has described the scene anew because of another StartPolicy */
   }
   if (anew) {
     journal_->stale = true;
@@ -410,7 +412,8 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     M.begin        = t;
     M.first_begin         = old->model->continues ? old->model->first_begin : old->scene.start.time;
     M.number.owner = old->number.owner;
-    M.inherited_misfit    = 1e-2 * (atol + rtol) / std::max(MechanismSize(M.scene, DescribeAll(M.scene, t, FixedBodies::None)), 1e-2 * (atol + rtol)); /* ten times the error that the corrector of the old run leaves (Continue.ChainOfRuns) */
+    /* ten times the error that the corrector of the old run allows (Continue.ChainOfRuns) */
+    M.inherited_misfit    = 1e-2 * (atol + rtol) / std::max(MechanismSize(M.scene, DescribeAll(M.scene, t, FixedBodies::None)), 1e-2 * (atol + rtol));
     PetscErrorCode failed = CopyElementMemories(*old, M.scene);
     if (!failed) failed = WriteState(M, *old, U, V);
     if (!failed) failed = createTS(ts);

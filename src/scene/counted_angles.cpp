@@ -12,10 +12,11 @@ namespace hhtdae
 namespace
 {
 
-/* x_i, x_j and y_j; in a planar scene also the difference of their bodies' angles */
+/* Axes x of marker i, x and y of marker j; in a planar scene also the difference of the angle coordinates of their bodies */
 using Axes = std::array<double, 10>;
 
-/* Adds this rank's part for a marker: the owner of its body adds it, for the ground the first rank; about: marker j */
+/* Adds the entries of one marker to `sum` on the owner of its body, or on the first rank for the ground. about: true for
+   marker j, false for marker i */
 void AddAxes(const Runtime &R, const double *u, PetscInt marker, bool about, Axes &sum)
 {
   const MarkerData &m  = R.scene.markers[marker];
@@ -48,7 +49,7 @@ double PrincipalOf(const Axes &x)
   return std::atan2(yj.dot(xi), xj.dot(xi));
 }
 
-/* The marker's axes with the described attitude of its body */
+/* The marker's axes with its body in the described attitude, before assembly and equilibrium */
 Frame<double> AsDescribed(const Model &M, Marker m)
 {
   Frame<double>  f = M.scene.frame(m);
@@ -57,14 +58,14 @@ Frame<double> AsDescribed(const Model &M, Marker m)
   return f;
 }
 
-/* Initial value of the angle unknown of a planar body */
+/* Initial value of the angle coordinate of a planar body */
 double InitialPlanarAngle(const SceneData &s, PetscInt marker)
 {
   const PetscInt b = s.markers[marker].body;
   return b < 0 || s.bodies[b].point ? 0 : std::atan2(s.bodies[b].A(1, 0), s.bodies[b].A(0, 0));
 }
 
-/* The angle at t by the motion that prescribes it, counted from the start of the first run; false if there is none */
+/* The angle at t, with full turns since the start of the first run, that a motion prescribes; false if no motion prescribes it */
 bool PrescribedAngle(const Model &M, double t, PetscInt i, PetscInt j, double *angle)
 {
   double from, to;
@@ -80,7 +81,7 @@ bool PrescribedAngle(const Model &M, double t, PetscInt i, PetscInt j, double *a
 
 } // namespace
 
-/* In the description the angle is in (-pi, pi]; assembly and equilibrium are taken to have changed it by less than half a turn */
+/* The described angle is in (-pi, pi]; it is assumed that assembly and equilibrium have changed it by less than half a turn */
 double StartAngle(const Model &M, Marker i, Marker j)
 {
   return Unwind<double>(PrincipalAngle<double>(M.scene.frame(i), M.scene.frame(j)), PrincipalAngle<double>(AsDescribed(M, i), AsDescribed(M, j)));
@@ -127,7 +128,7 @@ PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt 
   PetscFunctionReturn(0);
 }
 
-/* Copies the full turns of planar bodies' angles: the new description has them in (-pi, pi] */
+/* Adds the full turns of planar bodies' angles to X; the new description has these angles in (-pi, pi] */
 static PetscErrorCode CarryPlanarAngles(const Runtime &from, Vec U, const Runtime &to, Vec X)
 {
   const double *u;

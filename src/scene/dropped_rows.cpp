@@ -1,7 +1,7 @@
 /*
-  Checks rows that were dropped as redundant at the start. They follow from the others only as long as the mechanism stays on the branch of motion on which it was
-  redundant, and dimensions, motions and functions are consistent. So they are evaluated after every accepted step and after every analysis; a violation is
-  an error.
+  Checks rows that were dropped as redundant at the start. The remaining rows imply them only as long as the mechanism stays
+  on the branch of motion on which they were redundant, and dimensions, motions and functions are consistent. So dropped rows
+  are evaluated after every accepted step and after every analysis; a violation is an error.
 */
 #include "measures.h"
 #include "runtime.h"
@@ -12,9 +12,9 @@ namespace hhtdae
 
 struct DroppedRows {
   struct Row {
-    int    number; /* in StartResult::dropped */
+    int    number; /* index in StartResult::dropped */
     int    probe, row;
-    double speed = 0; /* rows at velocity level: the largest sum of their terms so far */
+    double speed = 0; /* for rows at velocity level: largest sum of the magnitudes of their terms so far */
   };
   std::vector<std::unique_ptr<Probe>> probes;
   std::vector<bool>                   holonomic;
@@ -60,11 +60,12 @@ private:
 struct WorstRow {
   double ratio  = 0;
   int    number = -1;
-  double violation = 0; /* lengths, radians, their rates */
+  double violation = 0; /* a length, an angle in radians, or the rate of one */
 };
 
-/* Allowed violation: by the tolerance of the start or those of the run, since near a singular position the other rows imply a dropped one no
-   better (DroppedRows.ANetAndBricardsMechanism). unit: the scene's size, a speed, or 1 for angles */
+/* Allowed violation, from the larger of the tolerances of start and run: near a singular position the remaining rows
+   imply a dropped one with no greater accuracy (DroppedRows.ANetAndBricardsMechanism). unit: the scene's size, a speed,
+   or 1 for angles */
 double Allowed(const Runtime &R, double unit) { return std::max(std::max(R.scene.start.tolerance, R.tolerance_of[1]) * unit, R.tolerance_of[0]); }
 
 WorstRow FindWorst(const Runtime &R, const Evaluation &e)

@@ -26,18 +26,19 @@ namespace
 constexpr int    equilibrium_iterations = 2000;
 /* Unbalanced forces relative to the largest force of the scene, and violations of constraints relative to its size, that count as zero */
 constexpr double force_tolerance = 1e-10;
-/* Factors by which h grows at most from one step to the next: in general, and while the forces do less and less work (StepGrowth()) */
+/* Largest factor by which h grows from one step to the next: in general, and while the work of the forces decreases (StepGrowth()) */
 constexpr double max_growth            = 8;
 constexpr double max_growth_converging = 2;
 /* Steps shorter than this, in radians or parts of the scene's size, are accepted without further corrections */
 constexpr double negligible_step_length = 1e-9;
-/* Forces count as zero below this multiple of the forces that rounding of the coordinates causes, which no iteration reduces (Equilibrium.AMeshFarFromTheOrigin) */
+/* Forces below this multiple of the forces caused by rounding of the coordinates count as zero, since no iteration
+   reduces them (Equilibrium.AMeshFarFromTheOrigin) */
 constexpr double rounding_factor = 10;
-/* Distance to equilibrium in the energy norm, relative to the longest step, from which on meshes need further steps although all forces are balanced
-   (test_reactions_to_small_loads of tests/python), and the number of these steps */
+/* Distance to equilibrium in the energy norm, relative to the longest step, above which meshes need further steps although all forces are balanced
+   (test_reactions_to_small_loads of tests/python), and the largest number of these steps */
 constexpr double remaining_distance  = 1e-7;
 constexpr int    max_finishing_steps = 4;
-/* Part of a step's velocities at which damping is evaluated, StepResidual() */
+/* Damping forces are evaluated at this part of the velocities of a step, StepResidual() */
 constexpr double damping_velocity_factor = 1e-6;
 constexpr int    max_corrections         = 6; /* Newton corrections of a step beyond the first */
 /* Relative changes over the last step of states, variables, force states and motions at velocity level that count as zero; states are compared with at least state_floor, since the
@@ -49,7 +50,8 @@ constexpr double state_floor    = 1e-6;
 constexpr double residual_reduction = 0.3, correction_reduction = 0.05;
 
 struct Equilibrium : StillSystem {
-  Vec                 residual_at_start = nullptr, residual_at_rest = nullptr; /* of a step: before it, and after it without velocities; both also serve as work vectors */
+  /* residual before a step, and after it with zero velocities; both are also used as work vectors */
+  Vec                 residual_at_start = nullptr, residual_at_rest = nullptr;
   double              force_scale  = 0;                                        /* largest force so far, moments divided by the scene's size */
   double              h            = 0;                                        /* step size of the last step, s */
   double              largest_work = 0;                                        /* largest |work[0]| of a step so far */
@@ -63,12 +65,13 @@ struct Equilibrium : StillSystem {
   }
 };
 
-/* good: the step is taken; reach: its length in units of largest_turn; work: of the unbalanced forces before and after the step over its displacements */
+/* good: the step is accepted; reach: its length in units of largest_turn; work: work of the unbalanced forces before (0)
+   and after (1) the step over its displacements */
 struct StepResult {
   bool   good        = false;
-  int    corrections = 0; /* after the first */
+  int    corrections = 0; /* number of corrections after the first */
   double reach = INFINITY, work[2] = {0, 0};
-  double work_at_old_states = INFINITY; /* work[1] with first-order states as before the step */
+  double work_at_old_states = INFINITY; /* work[1] with the first-order states before the step */
 };
 
 /* *force: change of the residual's forces by random relative changes of the unknowns of machine precision. Positions of bodies are changed relative to at least the scene's size, since
@@ -122,7 +125,7 @@ PetscErrorCode ChooseScales(Equilibrium &E, double *h)
   PetscFunctionReturn(0);
 }
 
-/* Work of the forces in F over the displacements d of bodies and extensions; other rows are no forces */
+/* Work of the forces in F over the displacements d of bodies and extensions; other rows of F are not forces */
 PetscErrorCode WorkOf(const Equilibrium &E, Vec F, Vec d, double *work)
 {
   const Runtime     &R = E.R;
@@ -140,7 +143,8 @@ PetscErrorCode WorkOf(const Equilibrium &E, Vec F, Vec d, double *work)
   PetscFunctionReturn(0);
 }
 
-/* Work of the forces after a step if first-order states had not changed: their effect on forces is no stiffness. Variables and force states follow by one substitution */
+/* Work of the forces after a step if first-order states had not changed, because the effect of states on forces is not a
+   stiffness. Variables and force states are updated by one substitution */
 PetscErrorCode WorkAtStatesBefore(Equilibrium &E, double *work)
 {
   const Runtime  &R = E.R;
@@ -152,7 +156,7 @@ PetscErrorCode WorkAtStatesBefore(Equilibrium &E, double *work)
   PetscCall(ISGetSize(R.roles[TSHHT3_STATE], &all));
   if (!all) PetscFunctionReturn(0);
   PetscCall(VecCopy(E.next, E.A));
-  /* states by those of U; variables and force states minus their residuals */
+  /* First-order states are those of U; variables and force states are reduced by their residuals */
   const auto replace = [&](TSHHT3Role role) -> PetscErrorCode {
     PetscFunctionBegin;
     PetscCall(ISGetLocalSize(R.roles[role], &n));
@@ -253,8 +257,8 @@ PetscErrorCode StepResidual(Equilibrium &E, double h, Unbalanced &left)
 }
 
 /*
-  Further corrections if the first has increased the unbalanced forces. A linearized rotation stretches thin flexible parts, and the resulting axial forces
-  would reduce h although equilibrium is nearer.
+  Corrects a step further if the first correction has increased the unbalanced forces. A linearized rotation stretches thin
+  flexible parts; without these corrections the resulting axial forces would reduce h although equilibrium is nearer.
 */
 PetscErrorCode CorrectStep(Equilibrium &E, double h, double before, StepResult &a, Unbalanced &after)
 {
@@ -348,7 +352,8 @@ PetscErrorCode RateResidual(const Equilibrium &E, Vec F, double *part)
   PetscFunctionReturn(0);
 }
 
-/* Whether U is in equilibrium; E.F: residual at U. With stiff springs and meshes, rounding of coordinates causes forces beyond the tolerance: these count as zero, too. */
+/* Whether U is in equilibrium; E.F: residual at U. With stiff springs and meshes, rounding of the coordinates causes
+   forces above the tolerance; these also count as zero. */
 PetscErrorCode TestEquilibrium(Equilibrium &E, const Unbalanced &at, bool *found)
 {
   double rate_residual, rounding_force = 0, rounding_rate_residual = 0;
@@ -364,7 +369,7 @@ PetscErrorCode TestEquilibrium(Equilibrium &E, const Unbalanced &at, bool *found
   PetscFunctionReturn(0);
 }
 
-/* Finds states that no equation at rest reads (their columns are zero), such as an integral of power or of a control deviation */
+/* Finds states that no equation at rest reads, whose columns of the Jacobian are zero: for example an integral of power or of a control deviation */
 PetscErrorCode FindUnread(Equilibrium &E)
 {
   const IS        states = E.R.roles[TSHHT3_STATE];
@@ -411,9 +416,11 @@ PetscErrorCode RestoreUnread(Equilibrium &E, Vec begin)
   PetscFunctionReturn(0);
 }
 
-/* Whether a mesh needs a further step although its forces are balanced: they may be within rounding at every node and still sum up to a load, as inertia forces of a step with finite h.
-   The distance to equilibrium relative to the longest step is estimated as |w_1|/sqrt(w_0 w), from the work w_1 of the forces after and w_0 before this step, and w before the longest.
-   Growing steps are drift by rounding of a body that nothing holds. */
+/* Whether a mesh needs a further step although its forces are balanced. The forces may be within rounding at every node
+   and still sum up to a load, as the inertia forces of a step with finite h do. The distance to equilibrium relative to
+   the longest step is estimated as |w_1|/sqrt(w_0 w), where w_1 and w_0 are the work of the forces after and before this
+   step, and w the work before the longest step. Steps that grow are the drift, caused by rounding, of a body that nothing
+   holds; then no further step is needed. */
 bool NeedsFinishing(Equilibrium &E, const StepResult &a, double reach_before)
 {
   if (E.R.scene.extensions.empty()) return false;
@@ -457,8 +464,9 @@ PetscErrorCode StepToEquilibrium(Equilibrium &E, bool *found, Unbalanced &at)
   PetscFunctionReturn(0);
 }
 
-/* A state that scales a force which is zero at the start, as a stiffness at zero displacement, has a zero column there and is read nevertheless (SceneEquilibrium.AStateThatIsAFactor).
-   So states are reset to their values in `begin` only if no equation reads them at the end either, and equilibrium is tested again with these values. */
+/* A state that multiplies a force which is zero at the start, such as a stiffness at zero displacement, has a zero column
+   there although an equation reads it (SceneEquilibrium.AStateThatIsAFactor). So states are reset to their values in
+   `begin` only if no equation reads them at the end either, and equilibrium is tested again with these values. */
 PetscErrorCode FindEquilibriumState(Equilibrium &E, Vec begin, bool *found, Unbalanced &at)
 {
   PetscFunctionBegin;
@@ -489,7 +497,7 @@ PetscErrorCode FindEquilibriumState(Equilibrium &E, Vec begin, bool *found, Unba
 
 } // namespace
 
-/* U: start and result; undefined after an error */
+/* U: start of the iteration and result; undefined after an error */
 PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
 {
   Equilibrium E(R, t);

@@ -1,4 +1,5 @@
-/* Residual and Jacobian of the scene: exchange between ranks, motion of the bodies, elements, then the bodies' own rows. */
+/* Residual and Jacobian of the scene: exchange of unknowns between ranks, motion of the bodies, terms of the elements,
+   then inertia terms of the bodies. */
 #include "guard.h"
 #include "runtime.h"
 #include <algorithm>
@@ -6,7 +7,8 @@
 namespace hhtdae
 {
 
-/* Local unknowns: on one rank the arrays themselves, else copies of own values followed by those of other ranks */
+/* local: the local unknowns and their derivatives. On one rank these are the given arrays, else copies in which other
+   ranks' values follow the own ones */
 PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const double *a, const double *local[3])
 {
   const double *own[3] = {u, v, a};
@@ -28,7 +30,7 @@ PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const do
   PetscFunctionReturn(0);
 }
 
-/* V: velocities at the beginning of the step whose matrix is computed next */
+/* V: velocities at the beginning of the step whose Newton matrix is computed next */
 PetscErrorCode NoteBeginning(Runtime &R, Vec V)
 {
   const double *v, *local[3];
@@ -87,7 +89,7 @@ PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
 namespace
 {
 
-/* the nine blocks of a flexible body */
+/* Adds the nine diagonal blocks of a flexible body, ModalPart::block, to the matrix */
 void ModalBlocks(Runtime &R, PetscInt b, const Evaluation &e, const Slot *&slot)
 {
   const int size[3] = {3, 3, R.bodies.modes(b)}, at[3] = {0, 3, 6};

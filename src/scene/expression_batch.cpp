@@ -16,7 +16,7 @@ LocalFunction::LocalFunction(Localizer &l, const std::string &name, const Expres
   }
 }
 
-/* Reports a non-finite value, for which the step fails, under -info */
+/* With -info, reports a non-finite value, which makes the step fail */
 void LocalFunction::report(const Evaluation &e, const Piece &p, const double *m, double f) const
 {
   std::ostringstream text;

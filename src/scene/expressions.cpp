@@ -29,7 +29,7 @@ void AddRow(Localizer &l, ExpressionBatch &batch, ExpressionBatch::Kind kind, co
             l.group(number, 1));
 }
 
-/* the same on every rank */
+/* Whether an expression reads accelerations; the result is the same on every rank */
 bool UsesAcceleration(const SceneData &s)
 {
   if (!s.extensions.empty()) return true; /* their mass matrix couples coordinates of several ranks */
@@ -51,7 +51,8 @@ MarkerMotion<double> Described(const SceneData &s, Marker m)
 
 bool DescribedValue(const SceneData &s, const Expression &e, double t, std::size_t depth, double *x);
 
-/* Value of a measure at the described poses; false if it depends on more than time, positions, velocities, states and variables of these */
+/* Value of a measure at the described poses; false if it depends on anything but time, positions, velocities, states, and
+   variables that depend only on these */
 bool DescribedValue(const SceneData &s, const Measure &m, double t, std::size_t depth, double *x)
 {
   if (m.kind == Measure::Time) *x = t;
@@ -75,7 +76,8 @@ bool DescribedValue(const SceneData &s, const Measure &m, double t, std::size_t 
 bool DescribedValue(const SceneData &s, const Expression &e, double t, std::size_t depth, double *x)
 {
   double m[Real::most];
-  if (depth > s.variables.size() || e.arguments.size() > Real::most || !e.f) return false; /* depth: variables that read each other */
+  /* depth exceeds the number of variables if variables read each other in a cycle */
+  if (depth > s.variables.size() || e.arguments.size() > Real::most || !e.f) return false;
   for (std::size_t k = 0; k < e.arguments.size(); k++)
     if (!DescribedValue(s, e.arguments[k], t, depth, m + k)) return false;
   *x = UserFunction("variable", e).value(m);
@@ -152,7 +154,7 @@ std::string CheckModal(const SceneData &s, const Measure &m)
   return m.component >= 0 && m.component < n ? "" : s.bodies[m.target].name + " has modes 0 to " + std::to_string(n - 1) + ", not " + std::to_string(m.component);
 }
 
-/* A measure of a load needs a body on which the element acts */
+/* What is wrong with a measure of a load: its marker must be on a body on which the element acts */
 std::string CheckLoad(const SceneData &s, const Measure &m)
 {
   if (!s.valid(Element{m.target, m.scene})) return "its element is not one of this scene; add it first";

@@ -1,4 +1,4 @@
-/* Flexible bodies of a scene's description, and the frames of their attachments. */
+/* Adds flexible bodies, and the frames of their attachments, to the description of a scene. */
 #include "attach.h"
 #include <cmath>
 
@@ -57,7 +57,7 @@ bool Finite(const ModalBody &m)
   return good;
 }
 
-/* Largest coupling of a mode with rigid motion, relative to mass and size, which a constant mass matrix neglects */
+/* Largest coupling of a mode with rigid motion, relative to mass and size. A constant mass matrix (ModalMass::Constant) neglects it */
 double RigidContent(const ModalBody &m)
 {
   const double size = std::sqrt(m.moments.trace() / m.mass), scale = std::sqrt(m.mass);
@@ -69,7 +69,7 @@ double RigidContent(const ModalBody &m)
   return largest;
 }
 
-/* Error of the model as text, empty if there is none */
+/* What is wrong with the model, as text; empty if nothing */
 std::string FaultOfModel(const FlexibleBody &b, bool planar)
 {
   if (!b.model) return "it has no model; give a ModalBody";
@@ -87,7 +87,7 @@ std::string FaultOfModel(const FlexibleBody &b, bool planar)
   return "";
 }
 
-/* Error of the other data, if the model is right */
+/* What is wrong with the other data; called only if nothing is wrong with the model */
 std::string FaultOfValues(const FlexibleBody &b)
 {
   const PetscInt n = b.model->modes();
@@ -129,7 +129,9 @@ Body Scene::add(const std::string &name, const FlexibleBody &b)
   }
   const Body body = addRigid(who, r);
   if (!fault.empty()) data().errors.push_back("flexible body " + who + ": " + fault);
-  if (!wrong_model.empty()) return body; /* with a right one it is flexible all the same: nothing that is said of its modes is wrong for that */
+  /* with a valid model the body is added as a flexible one in spite of other errors, so that calls that refer to its
+     modes cause no further errors */
+  if (!wrong_model.empty()) return body;
   auto           f = std::make_shared<FlexibleData>();
   const PetscInt n = b.model->modes();
   f->model            = b.model;
@@ -190,13 +192,13 @@ Body Scene::frameAt(Body body, PetscInt place)
   return addFrame(body, place);
 }
 
-/* The frame starts at the deformed position of its point */
+/* Adds the frame of attachment or node a; initially the frame is at the deformed position of its point */
 Body Scene::addFrame(Body body, PetscInt a)
 {
   SceneData             &s = data();
   const BodyData        &b = s.bodies[body.id];
   const ModalAttachment &x = b.flexible->place(a);
-  const PetscInt         k = a - (PetscInt)b.flexible->model->attachments.size(); /* of a node */
+  const PetscInt         k = a - (PetscInt)b.flexible->model->attachments.size(); /* number of the node; negative for an attachment */
   const PetscInt         n = b.flexible->model->modes();
   const Eigen::Map<const Eigen::VectorXd> eta(b.flexible->deformation.data(), n), rate(b.flexible->deformation_rate.data(), n);
   const AttachedPoint point(x, eta);

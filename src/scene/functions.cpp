@@ -1,4 +1,4 @@
-/* Functions of time that a user gives, with exact first and second derivatives. */
+/* Users' functions of time, with exact first and second derivatives. */
 #include "hhtdae/functions.h"
 #include <algorithm>
 #include <cmath>
@@ -38,7 +38,7 @@ Value Polynomial(const std::vector<double> &c, double t)
   return v;
 }
 
-/* The polynomials of steps on [0, 1] times d, with derivatives */
+/* d times the polynomial that steps from 0 to 1 on [0, 1], with derivatives */
 Value Cubic(double s, double d) { return {d * s * s * (3 - 2 * s), d * 6 * s * (1 - s), d * (6 - 12 * s)}; }
 Value Quintic(double s, double d)
 {
@@ -46,7 +46,7 @@ Value Quintic(double s, double d)
   return {d * s * s * s * (10 + s * (6 * s - 15)), d * 30 * s * s * r * r, d * 60 * s * r * (r - s)};
 }
 
-/* From x0 before t0 to x1 after t1; NaN if t is NaN */
+/* Step from x0 before t0 to x1 after t1; NaN if t is NaN */
 Value Step(Value (*shape)(double, double), double t, double t0, double x0, double t1, double x1)
 {
   const double h = t1 - t0, s = (t - t0) / h;
@@ -56,7 +56,7 @@ Value Step(Value (*shape)(double, double), double t, double t0, double x0, doubl
   return {x0 + p.f, p.f1 / h, p.f2 / (h * h)};
 }
 
-/* The same for a Real. NaN unless x1 > x0, which is reported at the start of the run. */
+/* The same for a Real: step from h0 at x0 to h1 at x1. NaN unless x1 > x0; the start of the run reports such values. */
 Real Step(Value (*shape)(double, double), const Real &x, double x0, double h0, double x1, double h1)
 {
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -64,7 +64,7 @@ Real Step(Value (*shape)(double, double), const Real &x, double x0, double h0, d
   return chain(x, y.f, y.f1);
 }
 
-/* Error of a step function's data as text, empty if there is none */
+/* What is wrong with the data of a step function, as text; empty if nothing */
 std::string StepError(double t0, double x0, double t1, double x1)
 {
   if (!Finite({t0, x0, t1, x1})) return "times and values of a step function must be finite";
@@ -75,7 +75,7 @@ std::string StepError(double t0, double x0, double t1, double x1)
 struct Spline {
   std::vector<double> t, x, m; /* knots and second derivatives there */
 
-  /* m from continuity of the first derivative, m_0 = m_n = 0: a tridiagonal system, diagonally dominant */
+  /* Computes m from continuity of the first derivative with m_0 = m_n = 0, a diagonally dominant tridiagonal system */
   void solve()
   {
     const size_t        n = t.size();
@@ -110,7 +110,8 @@ struct Spline {
       Value        v      = inside(before ? 0 : last - 1, end);
       return {v.f + v.f1 * (at - end), v.f1, 0};
     }
-    const size_t k = std::upper_bound(t.begin(), t.end(), at) - t.begin(); /* t[k-1] <= at < t[k]; a NaN ends at last */
+    /* t[k-1] <= at < t[k]; if `at` is NaN, k is limited to the last interval below */
+    const size_t k = std::upper_bound(t.begin(), t.end(), at) - t.begin();
     return inside(std::min(std::max(k, size_t(1)), last) - 1, at);
   }
 };
@@ -122,7 +123,7 @@ TimeFunction::TimeFunction(double constant) : constant_(constant)
   if (!std::isfinite(constant)) error_ = Text("the constant is ", constant, ", must be finite");
 }
 
-/* A function with an error; its values are NaN. */
+/* A function that stores an error, which setUp() reports; its values are NaN. */
 TimeFunction TimeFunction::faulty(const std::string &error)
 {
   TimeFunction g;

@@ -1,6 +1,6 @@
 /*
-  Bodies and movements without inertia. The equations of motion are solvable if the mass matrix is positive definite on the movements that the
-  constraints allow. So the constraints have to determine movements N without inertia: Phi_q N must have full column rank.
+  Bodies and movements without inertia. The equations of motion can be solved if the mass matrix is positive definite on the movements that the
+  constraints allow. So the constraints must determine the movements without inertia, the columns of N: Phi_q N must have full column rank.
 */
 #include "products.h"
 #include "start.h"
@@ -15,10 +15,12 @@ namespace hhtdae
 namespace
 {
 
-constexpr double zero_moment_ratio = 1e-12; /* principal moments below this part of the body's largest one count as zero */
-constexpr double light_mass_ratio  = 1e-3;  /* substitute for missing inertia in the metric of assembly, relative to the lightest body's or the body's own */
+constexpr double zero_moment_ratio = 1e-12; /* principal moments of inertia below this part of the body's largest one count as zero */
+/* substitute for missing inertia in the metric of assembly, relative to that of the lightest body or of the body itself
+   */
+constexpr double light_mass_ratio  = 1e-3;
 constexpr double least_mass_ratio  = 1e-7;  /* least inertia in the metric of assembly, relative to the largest one (Massless.NextToNothing) */
-constexpr double rank_tolerance    = 1e-8;  /* pivot threshold of the rank of Phi_q N, whose columns have norm one */
+constexpr double rank_tolerance    = 1e-8;  /* pivot threshold for the rank of Phi_q N, whose columns are scaled to norm one */
 
 /* Axes, as columns in body axes, about which the body has no moment of inertia */
 Eigen::MatrixXd AxesWithoutInertia(const SceneData &s, const BodyData &b)
@@ -39,7 +41,7 @@ double LeastMoment(const SceneData &s, const BodyData &b)
 
 bool HasFullInertia(const SceneData &s, const BodyData &b) { return b.massless || b.flexible || (b.mass > 0 && AxesWithoutInertia(s, b).cols() == 0); }
 
-/* Movements of a body that have no inertia, as columns in its directions of motion */
+/* Movements of a body without inertia, as columns of components in its directions of motion */
 Eigen::MatrixXd MovementsWithoutInertia(const SceneData &s, const BodyData &b)
 {
   const std::vector<int> &d     = Directions(KindOf(s, b));
@@ -54,7 +56,8 @@ Eigen::MatrixXd MovementsWithoutInertia(const SceneData &s, const BodyData &b)
 
 } // namespace
 
-/* Sets the least inertia of each body in the metric of assembly: with a body far lighter than its neighbours, Phi_q M^-1 Phi_q^T would lose the coupling of these to rounding */
+/* Sets the least inertia of each body in the metric of assembly. If a body is far lighter than its neighbours, their
+   coupling would be lost in Phi_q M^-1 Phi_q^T by rounding */
 void FillLight(SceneData &s)
 {
   double lightest = INFINITY, heaviest = 0, moment = 0;

@@ -1,4 +1,4 @@
-/* The described state as unknowns of a run. */
+/* Converts the described initial state to the unknowns of a run. */
 #include "extension.h"
 #include "runtime.h"
 
@@ -23,7 +23,7 @@ void SetInitialState(const Runtime &R, const LocalBody &k, double *U, double *V)
     v[2] = b.w(2);
   }
   if (!TurnsInSpace(k.kind)) return;
-  Vector3 angles = Vector3::Zero(), rate = b.w; /* local rotation vectors are zero: their reference is the initial attitude */
+  Vector3 angles = Vector3::Zero(), rate = b.w; /* local rotation vectors are zero, since their reference is the initial attitude */
   if (!R.bodies.local) {
     Matrix3   A;
     EulerAxes e;

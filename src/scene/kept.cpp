@@ -1,6 +1,7 @@
 /*
-  The last entries of the checkpoint vector of a scene (Runtime::axes), the same on every rank: values of parameters, a digest of the description, and the state
-  of the recorder, so that a resumed run continues the same files. Also compares descriptions between ranks by digests.
+  Writes and reads the last entries of the checkpoint vector of a scene (Runtime::axes), which are the same on every rank:
+  values of parameters, a digest of the description, and the state of the recorder, so that a resumed run continues the same
+  output files. Also compares the descriptions of different ranks by digests.
 */
 #include "runtime.h"
 #include "start.h"
@@ -17,7 +18,7 @@ namespace
 
 static_assert(checkpoint_numbers >= recorder_numbers + 3, "room for the digest, the recording, and whether parameters have changed");
 
-/* FNV-1a hash; numbers are rounded to single precision, since machines and compilers differ in rounding */
+/* FNV-1a hash. Numbers are rounded to single precision first, since machines and compilers differ in the last bits */
 class Digest
 {
 public:
@@ -36,7 +37,7 @@ public:
   {
     for (Eigen::Index i = 0; i < m.size(); i++) number(m.data()[i]);
   }
-  /* as two integers that doubles represent exactly */
+  /* Writes the hash as two integers that doubles represent exactly */
   void put(double x[2]) const
   {
     x[0] = (double)(sum_ >> 32);
@@ -79,7 +80,8 @@ void AddToDigest(Digest &d, const StoreBase &s)
   }
 }
 
-/* Digest of bodies, markers and the structure of elements; without stiffnesses and users' functions, which may be changed in a resumed run */
+/* Digest of bodies, markers and the structure of elements. Stiffnesses and users' functions are not included, since a
+   resumed run may have other ones */
 Digest MakeDigest(const SceneData &s)
 {
   Digest d;
@@ -145,7 +147,7 @@ std::vector<Section> SectionsOf(const SceneData &s)
   return all;
 }
 
-/* "rank 1", "ranks 1, 2, 5 and 7 more" */
+/* A list such as "rank 1" or "ranks 1, 2, 5 and 7 more" */
 std::string RankList(const std::vector<PetscMPIInt> &r)
 {
   constexpr std::size_t max_named = 5;
@@ -245,7 +247,7 @@ PetscErrorCode ReadKept(Runtime &R, const double *x)
              "The checkpoint belongs to another scene: bodies, markers, gravity or the elements and what they connect are not the same");
   PetscCall(ResumeOutput(R, x + 2));
   R.step_parameters = ParametersNow(R.scene);
-  if (x[checkpoint_numbers - 1] != 0) R.step_parameters.clear(); /* a parameter had been changed since the last step */
+  if (x[checkpoint_numbers - 1] != 0) R.step_parameters.clear(); /* a parameter had been changed between the last step and the checkpoint */
   PetscFunctionReturn(0);
 }
 

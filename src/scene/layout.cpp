@@ -1,4 +1,4 @@
-/* Lays out this rank's part of a run: bodies, markers, batches of elements, the pattern of its rows, the exchange with other ranks. */
+/* Sets up this rank's part of a run: bodies, markers, batches of elements, sparsity pattern of own rows, exchange with other ranks. */
 #include "attach.h"
 #include "extension.h"
 #include "runtime.h"
@@ -16,7 +16,8 @@ PetscMPIInt OwnerOfBody(const Runtime &R, PetscInt b) { return R.number.owner.em
 class LocalizerOf : public Localizer
 {
 public:
-  /* Collect: find the bodies and unknowns of other ranks that are needed. Place: number everything. Read: after the layout, for probes, without blocks of the matrix */
+  /* Collect: find the needed bodies and unknowns of other ranks. Place: assign local numbers. Read: after Layout(), for
+     probes, which have no blocks of the matrix */
   enum Pass { Collect, Place, Read };
   LocalizerOf(Runtime &r, Pass pass) : R(r), pass_(pass), collecting_(pass == Collect), marker_(r.scene.markers.size(), -1)
   {
@@ -73,7 +74,7 @@ public:
 
   Input input(const ScalarRef &r) override
   {
-    if (r.id < 0) return {}; /* none */
+    if (r.id < 0) return {}; /* no unknown */
     switch (r.kind) {
     case ScalarRef::Variable:
       return place(R.number.variable[r.id], 1, 0);
@@ -94,7 +95,7 @@ public:
       PetscInt offset = row;
       if (p.store->isConstraint()) {
         const unsigned char active = p.store->active(p.index);
-        if (!(active >> row & 1)) return {}; /* a dropped row: the multiplier is zero */
+        if (!(active >> row & 1)) return {}; /* the multiplier of a dropped row is zero */
         offset = 0;
         for (PetscInt i = 0; i < row; i++) offset += active >> i & 1;
       }
@@ -106,7 +107,7 @@ public:
   std::vector<PetscInt> other_bodies, others; /* results of Collect: bodies and unknowns of other ranks */
 
 private:
-  /* modal coordinates belong to the third group of the body, which MakeBody() has added */
+  /* A modal coordinate as an input. It belongs to the third group of its body, which MakeBody() has added */
   Input modal(const ScalarRef &r)
   {
     if (collecting_) {
@@ -152,7 +153,7 @@ LocalBody MakeBody(Runtime &R, PetscInt id, bool own)
   k.C.setIdentity();
   k.J = b.inertia;
   k.group = (PetscInt)R.pattern.group.size();
-  if (k.kind == BodyKind::Attached) { /* it has no unknowns */
+  if (k.kind == BodyKind::Attached) { /* a frame has no unknowns, only groups of columns for projection.h */
     for (int g = 0; g < frame_groups; g++) R.pattern.addFrameGroup((PetscInt)R.bodies.body.size(), 3 * g);
     return k;
   }
@@ -175,7 +176,7 @@ LocalBody MakeBody(Runtime &R, PetscInt id, bool own)
   return k;
 }
 
-/* Makes a Carrier for every flexible body with attachments on this rank; the body is here if a frame is */
+/* Makes a Carrier for every flexible body with attachments on this rank. If the frame of an attachment is on this rank, its body is, too */
 void MakeCarriers(Runtime &R)
 {
   Bodies               &B = R.bodies;
@@ -243,7 +244,8 @@ void SortUnique(std::vector<PetscInt> &x)
   x.erase(std::unique(x.begin(), x.end()), x.end());
 }
 
-/* PetscSF: leaves are the other ranks' unknowns on this rank; `boundary` has the roots with leaves */
+/* Creates the PetscSF of the exchange: its leaves are the other ranks' unknowns on this rank; `boundary` lists own
+   unknowns (roots) with leaves on other ranks */
 PetscErrorCode MakeExchange(Runtime &R)
 {
   const PetscInt  n = (PetscInt)R.others.size();
@@ -270,7 +272,7 @@ PetscErrorCode MakeExchange(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* The bodies' own blocks are requested first, so that the first slots are theirs */
+/* Requests the diagonal blocks of the bodies first, so that the first slots belong to them */
 PetscErrorCode MakePattern(Runtime &R)
 {
   PetscInt bodies = 0;
@@ -356,7 +358,7 @@ PetscErrorCode Layout(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* A probe of a part of an element, made at the first query; with the present memories */
+/* The probe of a part of an element, with the present memories of the run; it is made at the first query */
 Probe &ReaderOf(Runtime &R, const Part &p)
 {
   std::unique_ptr<Probe> &reader = R.readers[{p.store, p.index}];

@@ -25,7 +25,8 @@ MarkerMotion<double> MotionOfMarker(const Evaluation &e, PetscInt marker, bool a
 namespace
 {
 
-/* The same from coordinates, velocities and accelerations that are duals: dA = [G dq] A */
+/* Attitude and angular motion of a body with a local rotation vector, from coordinates q, velocities p and accelerations
+   s as dual numbers: dA = [G dq] A */
 template <class T> void LocalMotion(const Bodies &bodies, const BodyMotion &b, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
 {
   const Matrix3 G = b.G * bodies.inStep(b);
@@ -42,7 +43,7 @@ template <class T> void LocalMotion(const Bodies &bodies, const BodyMotion &b, c
   }
 }
 
-/* of Euler angles; formulas of euler.h and bodies.cpp */
+/* The same for Euler angles, with the formulas of euler.h and bodies.cpp */
 template <class T>
 void EulerMotion(const LocalBody &l, const T *q, const T *p, const T *s, Mat3<T> &A, MarkerMotion<T> &m)
 {
@@ -75,7 +76,8 @@ void PlanarMotion(const T &angle, const T &rate, const T &acceleration, Mat3<T> 
   m.alpha(2)        = acceleration;
 }
 
-/* Of a marker on an attachment's frame, directions first..: x and theta of the frame, or v and w, or a and alpha, the others held */
+/* Motion of a marker on an attachment's frame. The six directions from `first` on are x and theta of the frame (order 0),
+   v and w (1), or a and alpha (2); the others stay constant */
 MarkerMotion<MeasureDual> FrameMotion(const Evaluation &e, PetscInt marker, int first, int order)
 {
   using T              = MeasureDual;

@@ -18,7 +18,7 @@ bool IsScalar(Measure::Kind k)
 
 bool Accelerates(Measure::Kind k) { return k == Measure::Acceleration || k == Measure::AngularAcceleration; }
 
-/* ---- reactions of joints: f . axis, or (m + arm x f) . axis, summed over the markers on i's body ---- */
+/* ---- reactions of elements: f . axis, or (m + arm x f) . axis, summed over the element's markers on i's body ---- */
 
 Vector3 AxisOf(const LocalMeasure &m, const Evaluation &e)
 {
@@ -33,7 +33,7 @@ bool OnBody(const Evaluation &e, const LocalMeasure &m, PetscInt marker)
   return e.bodies.marker[marker].body == e.bodies.marker[m.i].body;
 }
 
-/* i's body, or, if this is an attachment on which the element does not act, its flexible body, on whose modes it may act */
+/* The body of marker i; if that is an attachment on which the element does not act, its flexible body, on whose modes the element may act */
 PetscInt LoadedBody(const LocalMeasure &m, const Evaluation &e)
 {
   const PetscInt body = e.bodies.marker[m.i].body, carrier = e.bodies.body[body].carrier;
@@ -44,7 +44,7 @@ PetscInt LoadedBody(const LocalMeasure &m, const Evaluation &e)
   return e.bodies.carriers[carrier].body;
 }
 
-/* force on i's body, or moment about i's origin, by an element */
+/* Force by an element on i's body, or moment about i's origin */
 Vector3 ReactionOf(const LocalMeasure &m, const Evaluation &e)
 {
   const Vector3  x = e.bodies.frame(m.i).x;
@@ -94,7 +94,7 @@ void AddJointGradient(const LocalMeasure &m, const Evaluation &e, double factor,
     p->reactionGradient(e, y.data(), by.data(), lambda);
     for (int k = 0; k < p->markers(); k++) {
       Matrix<1, 6> J = by.segment<6>(6 * k).transpose();
-      if (!force && OnBody(e, m, p->marker(k))) { /* the arm changes */
+      if (!force && OnBody(e, m, p->marker(k))) { /* the arm of the moment changes */
         const Vector3 turn = on[k].f.cross(axis);
         Matrix<1, 6>  back = Matrix<1, 6>::Zero();
         back.head<3>()     = -turn.transpose();
@@ -145,7 +145,7 @@ void PlaceLoad(Localizer &l, const Measure &m, LocalMeasure &k)
   for (const Part &p : s.elements[m.target].parts) k.probes.push_back(p.store->probe(l, p.index));
 }
 
-constexpr int max_force_components = 12; /* of a force, at most */
+constexpr int max_force_components = 12; /* largest number of components of a force */
 
 } // namespace
 
@@ -190,7 +190,7 @@ LocalMeasure PlaceMeasure(Localizer &l, const Measure &m)
   k.kind      = m.kind;
   k.component = m.component;
   const bool of_element = IsJoint(m.kind) || IsLoad(m.kind) || m.kind == Measure::Multiplier || m.kind == Measure::Component;
-  if (of_element && s.elements[m.target].parts.empty()) { /* an element without parts: zero, as a dropped multiplier */
+  if (of_element && s.elements[m.target].parts.empty()) { /* measures of an element without parts are zero, as a dropped multiplier is */
     k.kind = Measure::Multiplier;
     return k;
   }

@@ -9,22 +9,23 @@ namespace
 
 constexpr int At(int c, int d) { return 3 * c + d; }
 
-/* columns: S of xx, yy, zz, xy, yz, zx, then K of xy, yz, zx; see modal_products.h */
+/* columns for each vector x: S x for xx, yy, zz, xy, yz, zx, then K x for xy, yz, zx; see modal_products.h */
 constexpr int products_per_vector = 9;
 
-/* in the order of the columns of b */
+/* The entries of L in the order of the columns of b */
 Eigen::Matrix<double, 9, 1> ByColumns(const Matrix3 &L)
 {
   return Eigen::Map<const Eigen::Matrix<double, 9, 1>>(Matrix3(L.transpose()).data());
 }
 
-/* the vector a with a_i = M_(i+1, i+2) - M_(i+2, i+1): of int y z^T it makes int y x z */
+/* The vector a with a_i = M_(i+1, i+2) - M_(i+2, i+1). For M = int y z^T it is int y x z */
 Vector3 Axial(const Matrix3 &M) { return {M(1, 2) - M(2, 1), M(2, 0) - M(0, 2), M(0, 1) - M(1, 0)}; }
 
 bool Stiffened(const ModalBody &body) { return body.stiffening[0].size() > 0; }
 
-/* Moments of inertia less K_cd = eta^T C_cd eta, C the body's stiffening by w_c w_d, are those of int y y^T + K - tr(K)/2: so the invariants
-   quadratic in the modes take it along. It is symmetric and stays out of the mass matrix' part between modes. */
+/* The invariants quadratic in the modes, including geometric stiffening by rotation. C_cd, ModalBody::stiffening, reduces
+   the moments of inertia by K_cd = eta^T C_cd eta; this is equivalent to int y y^T + K - tr(K)/2 in place of int y y^T.
+   Since the added matrices are symmetric, they do not change the part of the mass matrix between modes. */
 ModalProducts Products(const ModalBody &body, bool full)
 {
   const int                      m = (int)body.modes();
@@ -67,7 +68,7 @@ void ModalDynamics::addProducts(int vector, Columns &to) const
   }
 }
 
-/* All products that are asked for in one pass over the invariants */
+/* Computes all products that `what` needs in one pass over the invariants */
 void ModalDynamics::products(const ModalMotion &q, For what)
 {
   const bool gradient = what == For::Gradient;
@@ -137,7 +138,8 @@ void ModalDynamics::gradient(const ModalMotion &q, double sv, double sa, const M
   G.f = q.A * (body_->mass * a0 + L * c_ + 2 * O * p_ + pa_);
   G.n = q.A * Axial(c_ * a0.transpose() + I2_ * L.transpose() + 2 * V_ * O.transpose() + W_);
 
-  /* rigid rows and columns: partial derivatives in body axes, turned into space; a turn of the body changes what is constant in space */
+  /* Rigid rows and columns: partial derivatives in body axes, transformed to space axes. A rotation of the body also
+     changes the body components of vectors that are constant in space. */
   const auto turned = [&](const Matrix3 &D) { return Matrix3(q.A * D * At_); };
   const Matrix3 fw = turned(-Cross<double>(w.cross(c_)) - O * X - 2 * Cross<double>(p_)), fa = turned(-X);
   const Matrix3 na = turned(X), nw = turned(O * J - Cross<double>(J * w) + 2 * (V_.trace() * Matrix3::Identity() - V_.transpose()));
@@ -151,9 +153,9 @@ void ModalDynamics::gradient(const ModalMotion &q, double sv, double sa, const M
   G.rigid_modal.setZero(m_, 6);
   if (!linear_) return;
 
-  /* modal rows by a0, w, alpha */
+  /* Rows of the modes: derivatives by a0, w, alpha */
   Factors hw = Factors::Zero(), halpha = Factors::Zero();
-  Matrix3 hs; /* of skew_rate_ */
+  Matrix3 hs; /* factors of skew_rate_ */
   for (int a = 0; a < 3; a++) {
     const int i = (a + 1) % 3, j = (a + 2) % 3;
     halpha(At(j, i), a) += 1;
@@ -171,10 +173,10 @@ void ModalDynamics::gradient(const ModalMotion &q, double sv, double sa, const M
   by(3) = b_.lazyProduct(Factors(halpha * At_));
   by(1) = by(0).lazyProduct(turn[0]) + by(2).lazyProduct(turn[1]) + by(3).lazyProduct(turn[2]);
 
-  /* rigid rows by modal coordinates: of int y_c (acceleration)_d, with the sign of (c, d) in the axial part */
+  /* Rigid rows: derivatives by modal coordinates of int y_c (acceleration)_d, with the sign of (c, d) in Axial() */
   G.rigid_modal.leftCols<3>() = first_.lazyProduct(Matrix3((q.A * (L + 2 * sv * O + sa * Matrix3::Identity())).transpose()));
   Factors yb = Factors::Zero(), yr = Factors::Zero();
-  Matrix3 yf = Matrix3::Zero(), ys; /* of first_, skew_acc_ */
+  Matrix3 yf = Matrix3::Zero(), ys; /* factors of first_ and skew_acc_ */
   for (int a = 0; a < 3; a++) {
     const int i = (a + 1) % 3, j = (a + 2) % 3;
     for (int sign : {1, -1}) {

@@ -1,12 +1,12 @@
 /*
   Loops over the packed invariants.
 
-  A panel is four columns of the lower triangle, from the four by four block on the diagonal down; of that block one half
-  is stored, so that it needs no special treatment where every entry is used at its place and at the mirrored one. Panels
-  of all matrices with the same columns stand one behind the other: the symmetric ones, then the skew ones.
+  A panel is four columns of the lower triangle, from the 4 x 4 block on the diagonal downwards. Only half of the values of that block are
+  stored, so that the block needs no special treatment in loops that use each entry both at its place and at the mirrored place. Panels
+  with the same columns are contiguous: first those of the symmetric matrices, then those of the skew-symmetric ones.
 
-  Eigen and the compiler use the instructions that they are told to, which are those of the oldest processor where a
-  library is made for many. These loops are compiled twice; the processor at hand decides.
+  A library for many processors is compiled for the instructions of the oldest one. These loops are compiled twice, also with newer
+  instructions, and the version is chosen at run time.
 */
 #include "modal_products.h"
 #include <algorithm>
@@ -35,7 +35,8 @@ ALWAYS_INLINE const Four &At(const double *p) { return *reinterpret_cast<const F
 
 /* ---- products with vectors ---- */
 
-/* A panel of so many rows and its mirror image: y += A x below, y += sign A^T x above; x and y begin at its columns */
+/* Products with a panel A of `rows` rows and its mirror image: y += A x for the lower triangle, y += sign A^T x for the
+   upper one; x and y begin at the first column of the panel */
 ALWAYS_INLINE void Mirrored(int rows, const double *a, const double *x, double *y, double sign)
 {
   const Four x0 = {x[0], x[0], x[0], x[0]}, x1 = {x[1], x[1], x[1], x[1]}, x2 = {x[2], x[2], x[2], x[2]}, x3 = {x[3], x[3], x[3], x[3]};
@@ -75,12 +76,12 @@ struct Sum {
   double        symmetric[6], skew[3]; /* factors */
   const double *left, *right;
   int           rank;
-  const int    *column; /* of left and right, `rank` of them */
+  const int    *column; /* numbers of the `rank` columns of left and right that are used */
   double       *out;
   long          ld;
 };
 
-/* `blocks` times four rows of a panel from row i on, both halves */
+/* Combines 4 blocks rows of a panel, from row i on, in both triangles */
 template <int blocks> ALWAYS_INLINE void CombineRows(const Packed &p, const Sum &sum, const double *a, int first, int i)
 {
   const int    rows = p.n - first;
@@ -141,7 +142,7 @@ ALWAYS_INLINE void AllDots(int rows, int columns, const double *A, const double 
   for (; c < columns; c++) Dots<1>(rows, A + (long)c * rows, x, y + c);
 }
 
-/* of two vectors, which read A once */
+/* The same for two vectors, with one pass over A */
 template <int columns> ALWAYS_INLINE void DotsOfTwo(int rows, const double *A, const double *const x[2], double *const y[2], int first)
 {
   Four s[columns], t[columns];
@@ -212,7 +213,7 @@ void DotsOfTwoNewer(int rows, int columns, const double *A, const double *const 
 void AddNewer(int rows, int columns, const double *A, const double *x, double *y) { AddAll(rows, columns, A, x, y); }
 #endif
 
-/* Panels of a square matrix, of which half the block on the diagonal is taken */
+/* Stores a panel of a square matrix; the entries of its block on the diagonal are halved. Returns the position after the panel */
 double *Store(const Eigen::MatrixXd &M, int n, int first, double *to)
 {
   const int m = (int)M.rows();
@@ -262,7 +263,7 @@ void ModalProducts::combine(const Eigen::Matrix3d &L, const double *left, const 
     if (!std::all_of(right + (long)r * padded_, right + (long)(r + 1) * padded_, [](double x) { return x == 0; })) used.push_back(r);
   Sum       sum  = {{}, {}, left, right, (int)used.size(), used.data(), out, ld};
   double   *s    = sum.symmetric;
-  const int pair = symmetric_ - 3; /* where xy begins */
+  const int pair = symmetric_ - 3; /* index of xy in `symmetric` */
   if (!symmetric_ && used.empty()) return;
   if (symmetric_) {
     const double zz = identity_ ? L(2, 2) : 0;

@@ -1,11 +1,10 @@
 /*
-  The smallest change d of poses or velocities, in the metric of the masses, with Phi_q d = rhs:
+  The smallest change d of poses or velocities, in the metric of the masses, that satisfies Phi_q d = rhs:
 
     d = d_0 + M^-1 Phi_q^T mu,   (Phi_q M^-1 Phi_q^T + delta) mu = rhs - Phi_q d_0
 
-  in velocities and angular velocities in space axes, in which M has one small block per body. delta = 1e-11 times the
-  diagonal keeps the matrix positive definite if constraints are redundant; the error that it causes is removed by the
-  iterations of the caller.
+  The components of d are velocities and angular velocities in space axes, for which M has one small block per body. delta = 1e-11 times the
+  diagonal keeps the matrix positive definite if constraints are redundant; the iterations of the caller remove the error that it causes.
 */
 #include "products.h"
 #include "start.h"
@@ -60,7 +59,7 @@ NearestSystem::~NearestSystem()
   PetscCallAbort(PETSC_COMM_SELF, VecScatterDestroy(&scatter_));
 }
 
-/* Numbers the rows; the owner of an element owns its rows */
+/* Assigns global numbers to the rows; the owner of an element owns its rows */
 PetscErrorCode NearestSystem::number(const std::vector<RowBlock> &blocks)
 {
   std::vector<PetscInt>    next(M.size + 1, 0);
@@ -86,7 +85,7 @@ PetscErrorCode NearestSystem::number(const std::vector<RowBlock> &blocks)
   PetscFunctionReturn(0);
 }
 
-/* This rank's rows of Phi_q M^-1 Phi_q^T + delta: a body couples all blocks that contain it */
+/* Computes this rank's rows of Phi_q M^-1 Phi_q^T + delta; each body couples all blocks of rows that contain it */
 PetscErrorCode NearestSystem::assemble(const std::vector<RowBlock> &blocks)
 {
   struct BodyColumns {
@@ -154,7 +153,8 @@ PetscErrorCode NearestSystem::factor(const std::vector<RowBlock> &blocks)
     PetscCall(KSPGetPC(ksp_, &pc));
     PetscCall(PCSetType(pc, PCCHOLESKY));
     PetscCall(MatGetFactorAvailable(S_, MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, &mumps));
-    if (mumps) PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS)); /* CHOLMOD's threads, which OMP_NUM_THREADS does not bound, take 50 times as long on a busy machine */
+    /* CHOLMOD's threads, which OMP_NUM_THREADS does not limit, make it up to 50 times slower on a busy machine */
+    if (mumps) PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
     PetscCall(KSPSetFromOptions(ksp_));
   }
   PetscCall(KSPSetOperators(ksp_, S_, S_));

@@ -1,11 +1,11 @@
-/* Global numbers of all unknowns, the same computation on every rank. */
+/* Assigns global numbers to all unknowns; every rank makes the same computation. */
 #include "extension.h"
 #include "model.h"
 
 namespace hhtdae
 {
 
-/* An element is owned by the owner of its first movable body */
+/* The owner of an element is the owner of its first movable body */
 PetscMPIInt OwnerOf(const Model &M, const StoreBase &s, PetscInt e)
 {
   if (M.size == 1) return 0;
@@ -25,14 +25,15 @@ BodyKind KindOf(const SceneData &s, const BodyData &b)
 
 PetscInt CoordinatesOf(const SceneData &s, const BodyData &b)
 {
-  if (b.carrier >= 0) return 0; /* the frame of an attachment follows its body */
+  if (b.carrier >= 0) return 0; /* the frame of an attachment has no coordinates */
   return Coordinates(KindOf(s, b)) + (b.flexible ? b.flexible->model->modes() : 0);
 }
 
 namespace
 {
 
-/* Visits everything that has unknowns, in the order of the numbers within a rank: f(owner, number of unknowns, reference to the first number) */
+/* Calls f(owner, number of unknowns, reference to the number of the first unknown) for everything that has unknowns, in
+   the order of the numbers within a rank */
 template <class F> void Visit(Model &M, F f)
 {
   SceneData &s = M.scene;
