@@ -1,8 +1,8 @@
 /*
   Loops over the packed invariants.
 
-  A panel is four columns of the lower triangle, from the 4 x 4 block on the diagonal downwards. Only half of the values of that block are
-  stored, so that the block needs no special treatment in loops that use each entry both at its place and at the mirrored place. Panels
+  A panel is four columns of the lower triangle, from the 4 x 4 block on the diagonal downwards. The entries of that block are stored multiplied
+  by 1/2, so that it needs no special treatment in loops that use each entry both at its place and at the mirrored place. Panels
   with the same columns are contiguous: first those of the symmetric matrices, then those of the skew-symmetric ones.
 
   A library for many processors is compiled for the instructions of the oldest one. These loops are compiled twice, also with newer

@@ -1,4 +1,4 @@
-/* The options of scenes, by which misspelt ones are found when PETSc ends. */
+/* The names of all options of scenes, from which misspelt ones are recognized in PetscFinalize(). */
 #include "start.h"
 #include <hhtdae/options.h>
 

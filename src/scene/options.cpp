@@ -1,4 +1,4 @@
-/* Options of the start, read once, and the report of its results. */
+/* Reads the options of the start, and reports its results. */
 #include "start.h"
 
 namespace hhtdae
@@ -46,7 +46,7 @@ PetscErrorCode ReadStartOptions(SceneData &s)
   PetscFunctionReturn(0);
 }
 
-/* Contents of the scene and results of the start */
+/* Views the contents of the scene and the results of the start */
 PetscErrorCode ViewStart(const SceneData &s, PetscViewer viewer)
 {
   const StartResult              &r = s.started;

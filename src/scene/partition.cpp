@@ -1,4 +1,5 @@
-/* Distributes bodies to ranks by METIS: vertices are weighted by their unknowns, edges by the joints and forces between them. */
+/* Distributes bodies to ranks by METIS. Vertices of the graph are bodies, weighted by their unknowns; edges are weighted
+   by the joints and forces between two bodies. */
 #include "model.h"
 #include <algorithm>
 #include <metis.h>
@@ -13,14 +14,14 @@ struct Edge {
   PetscInt a, b, weight;
 };
 
-/* Frames of attachments belong to the owner of their flexible body */
+/* The body of a marker; for the frame of an attachment its flexible body, with which it stays on one rank */
 PetscInt BodyOf(const SceneData &s, PetscInt marker)
 {
   const PetscInt b = s.markers[marker].body;
   return b >= 0 && s.bodies[b].carrier >= 0 ? s.bodies[b].carrier : b;
 }
 
-/* Pairs of bodies that an instance connects, by their vertices: the first with every other one suffices to keep them together */
+/* Edges between the first body of each instance and its other bodies; edges among the others are not needed to keep the bodies together */
 std::vector<Edge> Edges(const SceneData &s, const std::vector<PetscInt> &vertex)
 {
   std::vector<Edge> edges;
@@ -51,7 +52,7 @@ std::vector<Edge> Edges(const SceneData &s, const std::vector<PetscInt> &vertex)
 
 PetscErrorCode Partition(SceneData &s, PetscMPIInt size, std::vector<PetscMPIInt> &owner)
 {
-  std::vector<PetscInt> vertex(s.bodies.size(), -1), body; /* of bodies; of vertices */
+  std::vector<PetscInt> vertex(s.bodies.size(), -1), body; /* vertex: vertex of each body, or -1; body: body of each vertex */
   PetscMPIInt           rank;
   PetscFunctionBegin;
   owner.clear();
@@ -88,7 +89,7 @@ PetscErrorCode Partition(SceneData &s, PetscMPIInt size, std::vector<PetscMPIInt
     }
     idx_t options[METIS_NOPTIONS];
     METIS_SetDefaultOptions(options);
-    options[METIS_OPTION_SEED] = 1; /* the same parts in every run */
+    options[METIS_OPTION_SEED] = 1; /* a fixed seed gives the same partition in every run */
     const int error = METIS_PartGraphKway(&vertices, &balances, xadj.data(), adjacent.data(), size_of.data(), nullptr, weight.data(), &parts,
                                           nullptr, nullptr, options, &cut, part.data());
     PetscCheck(error == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS could not divide %zu bodies among %d ranks: error %d", n, size, error);

@@ -4,13 +4,13 @@
 namespace hhtdae
 {
 
-/* Determines the sorted columns of each row group, then the slots of all requests */
+/* Determines the sorted columns of each group of rows, then the slots of all requests */
 void Pattern::build(PetscInt start, PetscInt n)
 {
   struct Column {
     PetscInt group;
     bool     diagonal;
-    PetscInt at; /* first entry in the row, of its part of the matrix */
+    PetscInt at; /* position of the first entry in the row of the diagonal or off-diagonal part */
   };
   const std::size_t     groups = group.size();
   std::vector<PetscInt> first(groups + 1, 0);
@@ -23,7 +23,7 @@ void Pattern::build(PetscInt start, PetscInt n)
   for (const Request &r : request_)
     if (stored(r)) columns[fill[r.row]++] = {r.column, r.diagonal, 0};
 
-  /* columns are unique and sorted by global number, own ones first; diagonal if all requests for the block are */
+  /* Columns become unique and sorted by global number, own ones first. A block is diagonal if all requests for it are */
   const auto before = [&](const Column &a, const Column &b) {
     const Group &x = group[a.group], &y = group[b.group];
     return x.own != y.own ? x.own : x.global < y.global;
@@ -100,7 +100,7 @@ PetscErrorCode Pattern::createMat(MPI_Comm comm, PetscInt n, Mat *A) const
   if (size == 1) {
     PetscCall(MatSeqAIJSetPreallocationCSR(*A, di.data(), dj.data(), nullptr));
   } else {
-    /* one list of global columns per row, sorted */
+    /* MatMPIAIJSetPreallocationCSR() takes one sorted list of global columns per row */
     PetscInt start;
     std::vector<PetscInt> i(n + 1, 0), j;
     PetscLayout rows;

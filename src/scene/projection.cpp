@@ -9,12 +9,13 @@ namespace
 
 using Wide = Eigen::Matrix<double, Eigen::Dynamic, 6>;
 
-constexpr double asymmetry_tolerance = 1e-12; /* relative to the largest entry: smaller asymmetries are rounding of loads with a potential */
+constexpr double asymmetry_tolerance = 1e-12; /* relative to the largest entry; smaller asymmetries are rounding, which loads with a potential have */
 
 Carrier       &CarrierOf(Bodies &B, PetscInt frame) { return B.carriers[B.body[frame].carrier]; }
 const Carrier &CarrierOf(const Bodies &B, PetscInt frame) { return B.carriers[B.body[frame].carrier]; }
 
-/* Transforms columns (x, theta, v, w, a, alpha) of a frame to those of its body's position and angles (`rigid`), and of the attachment's motion */
+/* Transforms columns (x, theta, v, w, a, alpha) of a frame to columns of its body's position and angles (`rigid`), of the
+   attachment's (xi, phi) (`motion`), and of B eta' and B eta'' (`bend`) */
 struct ByBody {
   Wide rigid, motion, bend[2];
 
@@ -40,7 +41,7 @@ struct ByBody {
   }
 };
 
-/* Transforms rows (force, moment) on a frame to those of its body's position and angles, and of the attachment's motion */
+/* Transforms rows (force, moment) on a frame to six rows of its body's position and angles, and six rows of the attachment's (xi, phi) */
 template <class In> Eigen::Matrix<double, 12, Eigen::Dynamic> ToBody(const Bodies &B, PetscInt frame, const In &Y)
 {
   const Carrier                            &c = CarrierOf(B, frame);
@@ -55,7 +56,7 @@ template <class In> Eigen::Matrix<double, 12, Eigen::Dynamic> ToBody(const Bodie
   return out;
 }
 
-/* y += A B or A B^T */
+/* y += A B, or A B^T if `transposed` */
 void AddProduct(const Eigen::MatrixXd &A, const Eigen::MatrixXd &B, bool transposed, Eigen::Ref<Eigen::MatrixXd> y)
 {
   const PetscBLASInt m = (PetscBLASInt)y.rows(), n = (PetscBLASInt)y.cols(), k = (PetscBLASInt)A.cols(), lda = (PetscBLASInt)A.outerStride(),
@@ -161,7 +162,8 @@ void Projection::finish(Evaluation &e)
     if (B.body[B.carriers[c].body].owned) deliver(e, c);
 }
 
-/* d(L^T (f, m))/dq for loads on the frames fixed in space, without d(G^T m)/dq of the whole moment, which the body adds itself */
+/* Sets the Core of a body to d(L^T (f, m))/dq for loads on the frames that stay fixed in space. Bodies::modalJacobian()
+   adds d(G^T m)/dq for the sum m of all moments */
 void Projection::geometric(const Evaluation &e, std::size_t carrier)
 {
   const Bodies     &B    = e.bodies;
@@ -187,7 +189,7 @@ void Projection::geometric(const Evaluation &e, std::size_t carrier)
   }
 }
 
-/* Rows of a group of unknowns, columns of a frame: adds to the columns of r, angles and modes of the body */
+/* For rows of a group of unknowns and columns of a frame: adds to the columns of the body's position, angles and modes */
 void Projection::addColumns(Evaluation &e, const Pair &p)
 {
   const Carrier &c = CarrierOf(e.bodies, p.column_frame);
@@ -199,7 +201,7 @@ void Projection::addColumns(Evaluation &e, const Pair &p)
   addModalColumns(e, s[2], c, k, D.motion, D.bend);
 }
 
-/* wide_ = W times the transposed shapes of attachment k, or += with `more` */
+/* wide_ = W times the transposed shapes of attachment k; with `more` this is added to wide_ */
 void Projection::byModes(const Eigen::MatrixXd &shapes, const Carrier &c, int k, const Wide &W, int m, bool more)
 {
   const auto x = shapes.middleCols<3>(c.column(k, 0)), y = shapes.middleCols<3>(c.column(k, 1));
@@ -223,7 +225,7 @@ void Projection::addModalColumns(Evaluation &e, const Slot &s, const Carrier &c,
   e.sink.add(s, wide_, (int)wide_.rows(), m);
 }
 
-/* Rows of a frame, columns of a group of unknowns: adds to the rows of r, angles and modes of the body */
+/* For rows of a frame and columns of a group of unknowns: adds to the rows of the body's position, angles and modes */
 void Projection::addRows(Evaluation &e, const Pair &p)
 {
   const Carrier &c = CarrierOf(e.bodies, p.row_frame);
@@ -237,7 +239,7 @@ void Projection::addRows(Evaluation &e, const Pair &p)
   e.sink.add(s[2], wide_.transpose(), m, n);
 }
 
-/* Frames of two bodies: adds to the rows of r, angles and modes of one, columns of the other */
+/* For frames of two different bodies: adds to the rows of position, angles and modes of one body and the columns of the other */
 void Projection::addBoth(Evaluation &e, const Pair &p)
 {
   const Bodies   &B  = e.bodies;
@@ -246,7 +248,7 @@ void Projection::addBoth(Evaluation &e, const Pair &p)
   const Slot     *s = &slot_[p.first];
   const ByBody    D(block(p), cq.attached[kq].gradient, e.sv, e.sa, cq.stiffens());
   const auto      rigid = ToBody(B, p.row_frame, D.rigid), motion = ToBody(B, p.row_frame, D.motion);
-  Eigen::MatrixXd rows(6 + m, 12); /* of body p by those of body q, and by the motions of frame q */
+  Eigen::MatrixXd rows(6 + m, 12); /* rows of body p; columns: position and angles of body q, then (xi, phi) of frame q */
   const auto      modal = [&](const Eigen::MatrixXd &Y) {
     return Eigen::MatrixXd(cp.shapes.middleCols<3>(cp.column(kp, 0)).topRows(m) * Y.middleRows<3>(6) + cp.shapes.middleCols<3>(cp.column(kp, 1)).topRows(m) * Y.bottomRows<3>());
   };
@@ -271,7 +273,7 @@ void Projection::addBoth(Evaluation &e, const Pair &p)
   }
 }
 
-/* Frames of the same body: adds to its Core */
+/* For two frames of the same body: adds to the Core of the body */
 void Projection::collect(const Evaluation &e, const Pair &p)
 {
   const Bodies  &B    = e.bodies;
@@ -302,8 +304,9 @@ void Projection::collect(const Evaluation &e, const Pair &p)
   }
 }
 
-/* Hands the Core of a body over to its ModalPart. The symmetric part of the matrix between modes is added together with the invariants, at half the cost; damping and other loads without a
-   potential leave an unsymmetric part */
+/* Transfers the Core of a body to its ModalPart. The symmetric part of the matrix between modes is added together with
+   the invariants (ModalProducts::combine()), at half the cost; damping and other loads without a potential leave an
+   unsymmetric part */
 void Projection::deliver(Evaluation &e, std::size_t carrier)
 {
   const Carrier &c    = e.bodies.carriers[carrier];
@@ -325,7 +328,7 @@ void Projection::deliver(Evaluation &e, std::size_t carrier)
   if (c.stiffens()) c.stiffen(p.stiffening);
 }
 
-/* right += shapes of attachment k times D, in the columns of attachment l */
+/* Adds shapes of attachment k times D to the columns of attachment l in `right` */
 void Projection::addTo(Eigen::MatrixXd &right, const Carrier &c, int k, int l, const Matrix<6, 6> &D)
 {
   for (int ends = 0; ends < 4; ends++) {

@@ -31,7 +31,7 @@ PetscReal Snapshot::time() const { return work_->t; }
 namespace
 {
 
-/* Local unknowns of a state: own ones and those of other ranks that this rank reads */
+/* The local unknowns of a state: own ones, then those of other ranks that this rank reads */
 PetscErrorCode Localize(Runtime &R, Vec W[3], std::vector<double> *out[3])
 {
   const double       *w[3], *local[3];
@@ -44,7 +44,7 @@ PetscErrorCode Localize(Runtime &R, Vec W[3], std::vector<double> *out[3])
   PetscFunctionReturn(0);
 }
 
-constexpr int motion_size = 24; /* numbers of a Motion */
+constexpr int motion_size = 24; /* number of values in a Motion */
 
 void Pack(const Motion &m, double *x)
 {
@@ -75,7 +75,7 @@ Motion OfBody(const Runtime &R, PetscInt id, const Evaluation &e)
   return m;
 }
 
-/* Motion of the point at s of the same body, with its own axes */
+/* Motion of a point fixed to the body with motion b: s is its position in the body, `axes` its axes there */
 Motion MotionAtPoint(const Motion &b, const Vector3 &s, const Matrix3 &axes)
 {
   const Vector3 arm = b.axes * s, &w = b.angular_velocity;
@@ -113,7 +113,7 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   for (Vec &x : W) PetscCall(VecDuplicate(U, &x));
   PetscErrorCode failed = StateAt(ts, t, true, W, &copy);
   if (!failed) failed = take(*w.R, t, W);
-  /* a copy that has made the first step has its own reference attitudes */
+  /* a copy that has made the first step has other reference attitudes than the run */
   for (std::size_t b = 0; copy && !failed && b < w.origin.references.size(); b++) w.origin.references[b] = RunOf(copy)->bodies.body[b].C;
   PetscCall(TSDestroy(&copy));
   for (Vec &x : W) PetscCall(VecDestroy(&x));

@@ -6,7 +6,7 @@
 namespace hhtdae
 {
 
-/* Value of an unknown; global = -1: a dropped multiplier, zero */
+/* Value of an unknown; zero for global = -1, a dropped multiplier */
 PetscErrorCode Snapshot::Work::scalar(PetscMPIInt owner, PetscInt global, double *x)
 {
   PetscFunctionBegin;
@@ -71,7 +71,7 @@ PetscErrorCode Snapshot::Work::ofMarkers(const Measure &m, double *x)
   PetscFunctionReturn(0);
 }
 
-/* From the first query of an angle on the run counts its full turns */
+/* The run counts the full turns of an angle from the first query of the angle on */
 PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
 {
   const auto                same = [&](const CountedAngle &c) { return c.i == i && c.j == j; };
@@ -86,7 +86,7 @@ PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
   } else {
     const CountFrom then(*R, origin);
     PetscCall(FirstAngle(*R, u.data(), t, i, j, &now[0]));
-    const bool here = origin.accepted_states == R->accepted_states; /* else the run has made steps since the state was taken */
+    const bool here = origin.accepted_states == R->accepted_states; /* false if the run has made steps since the state was stored */
     if (here && std::none_of(R->queried_angles.begin(), R->queried_angles.end(), same)) R->queried_angles.push_back(now[0]);
     origin.counted.push_back(now[0]);
   }
@@ -113,7 +113,7 @@ PetscErrorCode Snapshot::value(const Measure &m, double *x)
   if (m.kind == Measure::Value || m.kind == Measure::StateValue)
     PetscCheck(m.target < (PetscInt)(m.kind == Measure::Value ? N.variable : N.state).size(), s.comm, PETSC_ERR_ARG_WRONGSTATE,
                "Snapshot::value(): the %s came too late: the scene is fixed from its set-up or first run on", m.kind == Measure::Value ? "variable" : "state");
-  if (of_element && s.elements[m.target].parts.empty()) PetscFunctionReturn(0); /* absent */
+  if (of_element && s.elements[m.target].parts.empty()) PetscFunctionReturn(0); /* an element without parts: zero */
   switch (m.kind) {
   case Measure::Time: *x = w.t; break;
   case Measure::KineticEnergy: PetscCall(energy(x, &other)); break;

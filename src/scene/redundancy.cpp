@@ -1,16 +1,17 @@
 /*
   Finds redundant constraints: rows of Phi_q that depend linearly on others.
 
-  If the rows of a body are independent in its own columns, none of them takes part in a dependence: the body and its rows are removed, and its
-  neighbours are examined again. Tree structures vanish in this way. The remaining loops are eliminated by sparse Gaussian elimination, row by row in a
-  fill-reducing order of the elements: rows that vanish are redundant. (Sparse QR is some hundred times slower on nets of loops.) Every rank has the
-  description and computes the same.
+  If the rows of a body are independent in the columns of this body, none of them can be part of a linear dependence: the body
+  and its rows are removed, and its neighbours are examined again. This removes all tree structures. The rows of the remaining
+  loops are reduced by sparse Gaussian elimination, row by row in a fill-reducing order of the elements; rows that become zero
+  are redundant. (Sparse QR is some hundred times slower on nets of loops.) Every rank has the description and makes the same
+  computation.
 
-  Rows are scaled: translations are in units of the scene's size, modal coordinates in units that move the body's mass by it (SmallBodies.Attachments), and each
-  row has norm one.
+  Rows are scaled: translations are in units of LengthOfBodies(), modal coordinates in units that move the body's mass by this
+  length (SmallBodies.Attachments), and each row has norm one.
 
   At a singular position rows may be dependent that are independent elsewhere. So redundant rows are determined again at a neighbouring position that
-  satisfies the constraints, and only those that are redundant there, too, are dropped.
+  satisfies the constraints, and only rows that are redundant at both positions are dropped.
 */
 #include "extension.h"
 #include "start.h"
@@ -29,11 +30,12 @@ namespace hhtdae
 namespace
 {
 
-constexpr double clearly_independent = 1e-3; /* least pivot of a body's rows, of norm one, for the body to be removed */
+constexpr double clearly_independent = 1e-3; /* a body is removed if all pivots of its rows, which have norm one, are at least this large */
 constexpr double neighbour_distance  = 0.02; /* displacement to the neighbouring position: radians, parts of the scene's size */
 
-/* Pivots of rows of norm one below this count as zero, since dimensions and directions are described to about seven digits. With 1e-9 a hinge 1e-8 rad out of line locked a linkage without a
-   message, with arbitrarily large moments (SceneRedundant.AHingeSlightlyOutOfLine). */
+/* Pivots below this, of rows of norm one, count as zero, since dimensions and directions are described to about seven
+   digits. With 1e-9 a hinge 1e-8 rad out of line locked a linkage without a message and caused arbitrarily large moments
+   (SceneRedundant.AHingeSlightlyOutOfLine). */
 constexpr double rounding_of_descriptions = 1e-6;
 
 using Sparse = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
@@ -62,8 +64,9 @@ void Scale(const SceneData &s, std::vector<RowBlock> &blocks, double size)
   }
 }
 
-/* Length that relates translations to rotations: the scene's size, but at most ten times the largest distance of a marker from its body's centre of mass, so that a small mechanism
-   far from the origin or from others is scaled properly */
+/* Unit of translations when they are compared with rotations: the scene's size, but at most ten times the largest
+   distance of a marker from its body's centre of mass, so that a small mechanism far from the origin or from other
+   mechanisms is scaled properly */
 double LengthOfBodies(const SceneData &s)
 {
   double arm = 0, size = SceneSize(s);
@@ -72,7 +75,7 @@ double LengthOfBodies(const SceneData &s)
   return arm > 0 ? std::min(size, 10 * arm) : size;
 }
 
-/* Removes tree structures; core() has the remaining rows in the order of the blocks */
+/* Removes tree structures; core() returns the remaining rows in the order of the blocks */
 class Pruning
 {
 public:
@@ -110,7 +113,7 @@ public:
 private:
   const SceneData                      &s_;
   const std::vector<RowBlock>          &blocks_;
-  std::vector<std::vector<std::size_t>> blocks_at_; /* of each body */
+  std::vector<std::vector<std::size_t>> blocks_at_; /* blocks of rows that contain each body */
   std::vector<unsigned>                 open_;      /* bits of the remaining rows of each block */
 
   /* Removes the rows at body b if they are independent in its columns; returns the blocks that have lost rows */
@@ -147,12 +150,13 @@ private:
   }
 };
 
-/* Order of elimination: COLAMD on elements and bodies reduces fill; elements that are never redundant come first; within an element rows of positions come before
-   those of directions, because the last of dependent rows is dropped */
+/* Order of elimination. The last of several dependent rows is dropped. So elements that are never redundant come first,
+   the others in the order of COLAMD for the matrix of elements and bodies, which reduces fill; within an element rows for
+   positions come before rows for directions. */
 std::vector<std::size_t> EliminationOrder(const std::vector<RowBlock> &blocks, const std::vector<RowRef> &core,
                                           std::size_t bodies)
 {
-  std::vector<std::size_t>            first; /* row of each element */
+  std::vector<std::size_t>            first; /* first row of each element */
   std::vector<Eigen::Triplet<double>> entry;
   for (std::size_t k = 0; k < core.size(); k++) {
     if (!k || blocks[core[k].block].element != blocks[core[k - 1].block].element) first.push_back(k);
@@ -175,15 +179,15 @@ std::vector<std::size_t> EliminationOrder(const std::vector<RowBlock> &blocks, c
 }
 
 /*
-  Gaussian elimination of one sparse row after the other, each with its largest remaining entry as the pivot: a row that
-  vanishes is a linear combination of those before it.
+  Gaussian elimination of one sparse row after the other. The pivot of a row is its largest entry after elimination; a row whose entries
+  are then all zero is a linear combination of the rows before it.
 */
 class Elimination
 {
 public:
   explicit Elimination(int columns) : pivot_(columns, -1), work_(columns, 0.0), seen_(columns, 0) {}
 
-  /* false if the row depends on those that were added before */
+  /* Adds a row; returns false if it depends on the rows that were added before */
   bool add(const std::vector<std::pair<int, double>> &row, double threshold)
   {
     std::vector<int> touched;
@@ -216,7 +220,7 @@ private:
     int                                 column;
     std::vector<std::pair<int, double>> rest; /* divided by the pivot */
   };
-  std::vector<int>                                              pivot_; /* row of which a column is the pivot */
+  std::vector<int>                                              pivot_; /* for each column: the row whose pivot it is, or -1 */
   std::vector<double>                                           work_;
   std::vector<char>                                             seen_;
   std::vector<Row>                                              rows_;
@@ -242,7 +246,7 @@ private:
     }
     return good;
   }
-  static constexpr double rounding_of_rows = 1e-14; /* entries below this are rounding: rows have norm one */
+  static constexpr double rounding_of_rows = 1e-14; /* entries below this are rounding, since rows have norm one */
 };
 
 /* The rows of the core that depend on the others, in the order of the description */
@@ -253,7 +257,7 @@ std::vector<RowRef> Dependent(const SceneData &s, const std::vector<RowBlock> &b
   if (core.empty()) return found;
   std::vector<std::pair<int, double>> row;
   std::vector<std::size_t>            redundant;
-  std::vector<int>                    first(s.bodies.size() + 1, 0); /* column */
+  std::vector<int>                    first(s.bodies.size() + 1, 0); /* first column of each body */
   for (std::size_t b = 0; b < s.bodies.size(); b++) first[b + 1] = first[b] + Width(s, (PetscInt)b);
   Elimination elimination(first.back());
   for (std::size_t j : EliminationOrder(blocks, core, s.bodies.size())) {
@@ -275,7 +279,7 @@ std::vector<RowRef> FindRedundant(SceneData &s, std::vector<RowBlock> &blocks)
   Scale(s, blocks, LengthOfBodies(s));
   const std::vector<RowRef> core = Pruning(s, blocks).core();
   s.started.core                 = (PetscInt)core.size();
-  /* dependences are as accurate as the constraints are satisfied */
+  /* linear dependences hold only as accurately as the constraints are satisfied */
   const double threshold = std::min(1e-5, std::max(rounding_of_descriptions, 100 * s.started.misfit));
   return Dependent(s, blocks, core, threshold);
 }
@@ -291,7 +295,7 @@ PetscErrorCode MoveAside(Model &M, const std::vector<RowBlock> &blocks, bool *mo
   std::vector<double>                    from(6 * s.bodies.size(), 0), d, rhs;
   double                                 most = 0;
   PetscFunctionBegin;
-  for (std::size_t i = 0; i < s.bodies.size(); i++) /* only directions of motion, none out of the plane of a planar scene */
+  for (std::size_t i = 0; i < s.bodies.size(); i++) /* only directions in which the body can move; none out of the plane of a planar scene */
     for (int k : Directions(KindOf(s, s.bodies[i]))) from[6 * i + k] = uniform(random) * (k < 3 ? size : 1);
   for (const RowBlock &b : blocks) rhs.insert(rhs.end(), b.rows, 0.0);
   PetscCall(system.factor(blocks));
@@ -317,7 +321,7 @@ void SetActive(const std::vector<RowBlock> &blocks, const std::vector<RowRef> &r
   }
 }
 
-/* Largest violation of rows at the present poses, lengths in units of the scene's size */
+/* Largest violation of the rows at the present poses, with lengths in units of the scene's size */
 double LargestMisfit(const SceneData &s, const std::vector<RowRef> &rows)
 {
   const double                size   = SceneSize(s);
@@ -331,8 +335,10 @@ double LargestMisfit(const SceneData &s, const std::vector<RowRef> &rows)
   return worst;
 }
 
-/* Moves the bodies to a neighbouring position that satisfies all constraints, except those that need deformations (LeftToDeform()); redundant ones to 1e-3 of the tolerance.
-   First without the redundant rows, which contradict the others near an inconsistent position; if they are violated then, with them */
+/* Moves the bodies to a neighbouring position that satisfies all constraints, except those that need deformations
+   (LeftToDeform()); redundant rows must be satisfied to 1e-3 of the tolerance. The first attempt leaves the redundant
+   rows out, since they contradict the others near an inconsistent position; if they are violated then, a second attempt
+   includes them. */
 PetscErrorCode MoveToNeighbour(Model &M, const std::vector<RowBlock> &blocks, const std::vector<RowRef> &redundant,
                                bool *moved, bool *ok)
 {
@@ -422,7 +428,7 @@ bool ReadsDroppedRow(const SceneData &s, const ElementData &e)
   return false;
 }
 
-/* Warns of friction elements that read the multiplier of a dropped row: it is zero, since other joints carry the load */
+/* Warns of friction elements that read the multiplier of a dropped row, which is zero because other joints carry the load */
 PetscErrorCode WarnReaders(SceneData &s)
 {
   PetscFunctionBegin;

@@ -1,12 +1,13 @@
 /*
   Reference attitudes of rotational coordinates. Local rotation vectors refer to the attitude at the last accepted step, which the integrator
-  reports, TSHHT3SetRotations().
+  reports through the callbacks of TSHHT3SetRotations().
 
-  With Euler angles, a body whose theta comes near 0 or pi gets new axes: the angles then describe another body-fixed frame, which
-  is far from the singularity. The integrator transforms angles, rates, accelerations and their history, TSHHT3SetCoordinateChange(). Its
-  test before each step also reports that the state has been accepted: memories, such as angles over full turns, are updated then.
+  With Euler angles, a body whose theta approaches 0 or pi gets new axes: the angles then describe another body-fixed frame,
+  which is far from the singularity. The integrator calls MapToNewAxes() to transform angles, rates, accelerations and their
+  history, TSHHT3SetCoordinateChange(). It calls TestAxes() before each step, when the state has been accepted; memories, such
+  as angles over full turns, are updated then.
 
-  References and memories are in one vector, Runtime::axes, which is part of checkpoints: the quaternion of LocalBody::C of each own
+  One vector, Runtime::axes, which is part of checkpoints, has the references and memories: the quaternion of LocalBody::C of each own
   body, the memories of the elements, and the numbers of kept.cpp.
 */
 #include "runtime.h"
@@ -29,7 +30,7 @@ void StoreQuaternion(const Eigen::Quaterniond &q, double *x)
 
 Matrix3 LoadQuaternion(const double *x) { return Eigen::Quaterniond(x[0], x[1], x[2], x[3]).normalized().toRotationMatrix(); }
 
-/* PetscSF: leaves are the other ranks' bodies on this rank, roots the own bodies of their owners */
+/* Creates the PetscSF of the axes: its leaves are copies of other ranks' bodies on this rank, its roots these bodies on their owners */
 PetscErrorCode MakeAxesExchange(Runtime &R)
 {
   std::vector<PetscInt>   place(R.scene.bodies.size()), next(R.size, 0);
@@ -78,7 +79,7 @@ PetscErrorCode ChooseNewAxes(Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* References and memories cannot go back in time */
+/* An error if t is before the time of the references and memories, which cannot be restored to an earlier time */
 PetscErrorCode CheckTime(Runtime &R, PetscReal t)
 {
   PetscFunctionBegin;
@@ -104,7 +105,8 @@ PetscErrorCode TestAxes(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, voi
   PetscFunctionReturn(0);
 }
 
-/* Transforms angles eps, rates and accelerations to new axes, at the same attitude, angular velocity and acceleration */
+/* Transforms Euler angles eps, their rates and accelerations from axes C to the axes `next`; attitude, angular velocity
+   and angular acceleration do not change */
 void MapBody(const Matrix3 &C, const Matrix3 &next, double *eps, double *rate, double *acc)
 {
   Matrix3   A;
@@ -140,7 +142,8 @@ PetscErrorCode MapToNewAxes(TS, PetscReal, Vec U, Vec V, Vec A, void *ctx)
   PetscFunctionReturn(0);
 }
 
-/* After a checkpoint has been loaded: sets the tolerances of angles, which a run sets in its first step, and reads the end of the vector */
+/* Called after a checkpoint has been loaded: sets the tolerances of angles, which other runs set in their first step, and
+   reads the last entries of the vector */
 PetscErrorCode ResumeFromCheckpoint(Runtime &R, TS ts)
 {
   double *x;
@@ -165,7 +168,7 @@ PetscErrorCode CommitAxes(TS ts, void *ctx)
     PetscCall(PetscInfo(ts, "new axes for the Euler angles of %s\n", R.scene.bodyName(R.bodies.body[R.next_body[i]].id).c_str()));
   }
   PetscCall(VecRestoreArray(R.axes, &x));
-  if (R.next_body.empty()) R.accepted = PETSC_NINFINITY; /* a checkpoint has been loaded, of any time */
+  if (R.next_body.empty()) R.accepted = PETSC_NINFINITY; /* a checkpoint has been loaded; its time may be before that of the present state */
   R.axes_changes += (PetscInt)R.next_body.size();
   R.next_body.clear();
   R.next_axes.clear();
@@ -175,7 +178,7 @@ PetscErrorCode CommitAxes(TS ts, void *ctx)
   PetscFunctionReturn(0);
 }
 
-/* Sends the references of own bodies to the other ranks that have them */
+/* Sends the references of own bodies to the other ranks with copies of these bodies */
 PetscErrorCode ExchangeReferences(Runtime &R, const double *own)
 {
   std::vector<double> other(4 * (R.bodies.body.size() - R.bodies.own));
@@ -193,7 +196,7 @@ PetscErrorCode ExchangeReferences(Runtime &R, const double *own)
   PetscFunctionReturn(0);
 }
 
-/* Takes the attitudes in U as references of local rotation vectors, which become zero */
+/* Makes the attitudes in U the references of local rotation vectors, which become zero in U */
 PetscErrorCode UpdateReferences(Runtime &R, Vec U)
 {
   double *u, *x;
@@ -274,7 +277,7 @@ void CopyMemories(Runtime &R, double *x, bool in)
   }
 }
 
-/* Moves the bodies of this rank, also those of other owners, to the state (U, V) */
+/* Moves the bodies on this rank, including copies of other ranks' bodies, to the state (U, V) */
 PetscErrorCode MoveBodies(Runtime &R, Vec U, Vec V)
 {
   const double *u, *v, *local[3];
@@ -306,7 +309,7 @@ PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* Before a run has begun: new references or axes at the same attitudes and angular velocities */
+/* For a run that has not begun: chooses new references or axes; attitudes and angular velocities do not change */
 PetscErrorCode RenewAxes(Runtime &R, Vec U, Vec V)
 {
   Vec A;
@@ -333,7 +336,7 @@ PetscErrorCode KeepMemories(Runtime &R)
   PetscFunctionReturn(0);
 }
 
-/* Creates the vector, with axes chosen by the initial attitudes and angular velocities */
+/* Creates the vector; axes of Euler angles are chosen by the initial attitudes and angular velocities */
 PetscErrorCode MakeAxes(Runtime &R)
 {
   double *x;
@@ -389,15 +392,16 @@ static PetscErrorCode ToleranceOfAngles(const Runtime &R, Vec U, double whole, d
   PetscFunctionReturn(0);
 }
 
-/* Angles get an absolute tolerance only, atol or -scene_angle_tol: relative to their values, which depend on the axes and grow with every turn, the tolerance would change although the
-   effect of an error does not */
+/* Angles have only an absolute tolerance, atol or -scene_angle_tol. A tolerance relative to their values, which depend on
+   the axes and grow with every turn, would change although the effect of an error does not. */
 PetscErrorCode AngleTolerances(Runtime &R, TS ts)
 {
   PetscReal atol, rtol;
   Vec       vatol, vrtol, U;
   PetscFunctionBegin;
   PetscCall(TSGetTolerances(ts, &atol, &vatol, &rtol, &vrtol));
-  if ((vatol && vatol != R.tolerance[0]) || (vrtol && vrtol != R.tolerance[1])) { /* tolerances set by the user; dropped rows use the largest */
+  /* the user has set tolerances of each unknown; the check of dropped rows uses the largest */
+  if ((vatol && vatol != R.tolerance[0]) || (vrtol && vrtol != R.tolerance[1])) {
     R.tolerance_of[0] = atol;
     R.tolerance_of[1] = rtol;
     if (R.dropped && vatol) PetscCall(VecMax(vatol, nullptr, &R.tolerance_of[0]));

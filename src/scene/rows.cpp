@@ -1,4 +1,4 @@
-/* All constraint rows of a scene at the described poses, and lengths to which their violations are related. */
+/* All rows of constraints of a scene at the described poses, and the lengths relative to which their violations are measured. */
 #include "start.h"
 #include <algorithm>
 #include <numeric>
@@ -52,7 +52,7 @@ bool IsFixed(FixedBodies fixed_bodies, const BodyData &b)
   return b.fixed_start && (fixed_bodies == FixedBodies::FixedStart || (fixed_bodies == FixedBodies::Nodes && of_nodes));
 }
 
-/* Movable bodies of an instance, and their first columns */
+/* Sets the movable bodies of an instance, and their first columns, in b */
 void FindBodies(const SceneData &s, const StoreBase &store, PetscInt e, FixedBodies fixed_bodies, ModalColumns modes, RowBlock &b)
 {
   int columns = 0;
@@ -67,7 +67,7 @@ void FindBodies(const SceneData &s, const StoreBase &store, PetscInt e, FixedBod
   b.column.push_back(columns);
 }
 
-/* b.speed = Phi_q q' + Phi_t, of all bodies, also fixed ones */
+/* b.speed = Phi_q q' + Phi_t, summed over all bodies, including those that must not be moved */
 void Speeds(const SceneData &s, const DescribedRows &d, RowBlock &b)
 {
   b.speed = b.rate;
@@ -134,14 +134,15 @@ double SceneSize(const SceneData &s)
   return size > 0 ? size : 1;
 }
 
-/* Unlike SceneSize() it excludes bodies without joints and markers used only for measures, which may be far away and would loosen the check of joints
-   (SceneAssembly.FarMarkersAndBodies). It is at least 1e-5 of the largest distance from the origin, whose rounding is then 1e-11 of it. */
+/* Unlike SceneSize() this excludes bodies without joints and markers used only for measures, which may be far away and
+   would weaken the check of joints (SceneAssembly.FarMarkersAndBodies). The size is at least 1e-5 of the largest distance
+   from the origin, so that rounding of positions is below 1e-11 of the size. */
 double MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks)
 {
   std::vector<PetscInt>           root(s.bodies.size());
   std::vector<Eigen::AlignedBox3d> box(s.bodies.size());
   double                          size = 0, far = 0;
-  bool                            deformable = false; /* reaches farther than its frame */
+  bool                            deformable = false; /* a body is flexible and extends beyond its frame: its size is not known here */
   const auto                      rootOf = [&](PetscInt b) {
     while (root[b] != b) b = root[b] = root[root[b]];
     return b;
@@ -164,7 +165,8 @@ double MechanismSize(const SceneData &s, const std::vector<RowBlock> &blocks)
     far  = std::max({far, b.min().norm(), b.max().norm()});
   }
   const double scene = SceneSize(s);
-  return deformable || size < 1e-6 * scene ? scene : std::max(size, 1e-5 * far); /* a body that is held at its origin has no size here */
+  /* a body whose only joint is at its origin would have the size zero */
+  return deformable || size < 1e-6 * scene ? scene : std::max(size, 1e-5 * far);
 }
 
 std::string RowName(const SceneData &s, PetscInt element, int row, const char *kernel)

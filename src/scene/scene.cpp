@@ -71,10 +71,10 @@ Body Scene::add(const std::string &name, const PointMass &b)
   return body;
 }
 
-/* What is wrong with a marker's position and axes, or nothing */
+/* What is wrong with a marker's position and axes, as text; empty if nothing */
 static std::string FaultOfPlace(const Vector3 &position, const Matrix3 &axes)
 {
-  constexpr double tolerance = 1e-8; /* rounding of axes that were computed, or written with eight digits */
+  constexpr double tolerance = 1e-8; /* allowed rounding of axes that were computed, or written with eight digits */
   const auto       list      = [](const Vector3 &x) { return "(" + Show(x(0)) + ", " + Show(x(1)) + ", " + Show(x(2)) + ")"; };
   if (!position.allFinite()) return "its position is " + list(position) + ", must be finite";
   if (!axes.allFinite()) return "its axes are not finite";
@@ -250,7 +250,7 @@ Element ElementBuilder::done()
 
 /* ---- set-up ---- */
 
-/* Removes results of an earlier set-up that has failed */
+/* Removes results of a previous set-up that has failed */
 static void BeginAnew(SceneData &s)
 {
   for (StoreBase *store : s.order)
@@ -260,7 +260,7 @@ static void BeginAnew(SceneData &s)
   s.started = StartResult();
 }
 
-/* Options of the linear solvers of assembly and equilibrium, one after another */
+/* Concatenates the options of the linear solvers of assembly and equilibrium */
 static PetscErrorCode SolverOptions(std::string &given)
 {
   char *all;
@@ -269,7 +269,7 @@ static PetscErrorCode SolverOptions(std::string &given)
   PetscCall(PetscOptionsGetAll(nullptr, &all));
   std::istringstream words(all);
   PetscCall(PetscFree(all));
-  bool ours = false; /* a value belongs to the name before it */
+  bool ours = false; /* whether the last option name has one of our prefixes; values follow their names */
   for (std::string word; words >> word;) {
     if (word[0] == '-' && !(word.size() > 1 && (std::isdigit(word[1]) || word[1] == '.'))) ours = word.rfind("-scene_assemble_", 0) == 0 || word.rfind("-scene_equilibrium_", 0) == 0;
     if (ours) given += word + " ";
@@ -277,7 +277,8 @@ static PetscErrorCode SolverOptions(std::string &given)
   PetscFunctionReturn(0);
 }
 
-/* Whether the present model was set up with another start(), or with other options of the set-up. These are asked for in any case, so that they count as used. */
+/* Whether the present model was set up with another start(), or with other options of the set-up. The options are always
+   queried, so that PETSc counts them as used. */
 static PetscErrorCode StartHasChanged(const SceneData &s, const StartPolicy &given, const std::string &solvers, bool *changed)
 {
   SceneData   now;
@@ -291,7 +292,7 @@ static PetscErrorCode StartHasChanged(const SceneData &s, const StartPolicy &giv
   PetscFunctionReturn(0);
 }
 
-/* Users' constraints are evaluated here, and may throw */
+/* The set-up evaluates users' constraints, which may throw */
 PetscErrorCode Scene::setUp()
 {
   PetscFunctionBegin;
@@ -325,7 +326,7 @@ PetscErrorCode Scene::setUp()
     if (s.start.equilibrium && !M.continues) PetscCall(FindEquilibrium(model_));
     if (s.start.view) PetscCall(ViewStart(s, PETSC_VIEWER_STDOUT_(s.comm)));
     s.markers_then = s.markers.size();
-    s.fixed = M.compiled = true; /* only at the end: after an error setUp() begins again */
+    s.fixed = M.compiled = true; /* set at the end only, so that setUp() begins again after an error */
     PetscFunctionReturn(0);
   }));
   PetscFunctionReturn(0);

@@ -1,4 +1,4 @@
-/* Writes the state of a run into the description of a scene, on every rank: after equilibrium, and for runs that continue others. */
+/* Writes the state of a run to the description of a scene, on every rank; used after equilibrium, and for runs that continue others. */
 #include "extension.h"
 #include "runtime.h"
 #include "start.h"
@@ -10,7 +10,7 @@ namespace hhtdae
 namespace
 {
 
-/* Deformations of flexible bodies and their rates, sent by their owners */
+/* Writes deformations of flexible bodies and their rates, which their owners send to all ranks */
 PetscErrorCode WriteModes(Model &M, const Runtime &R, const PetscScalar *u, const PetscScalar *v)
 {
   SceneData &s = M.scene;
@@ -35,7 +35,7 @@ PetscErrorCode WriteModes(Model &M, const Runtime &R, const PetscScalar *u, cons
 PetscErrorCode WriteState(Model &M, Runtime &R, Vec U, Vec V)
 {
   SceneData               &s     = M.scene;
-  const int                width = 19; /* numbers per body: index, position, attitude, velocities */
+  const int                width = 19; /* number of values per body: index, position, attitude, velocities */
   const PetscScalar       *u, *v;
   const double            *local[3];
   std::vector<double>      mine, all, rest(V ? 0 : R.n, 0.0);

@@ -1,6 +1,7 @@
 /*
-  Upper bounds on the next step that the error estimate does not give, since it vanishes in free flight whatever the step: no contact is tunnelled through, no counted angle turns
-  by more than half a turn (Batch::longestStep()), and rotation vectors stay small enough for their truncated series.
+  Upper bounds on the next step, so that no contact is tunnelled through, no counted angle turns by more than half a turn
+  (Batch::longestStep()), and rotation vectors stay small enough for their truncated series. The error estimate does not
+  ensure this, since it is zero in free flight for any step size.
 */
 #include "runtime.h"
 #include <limits>
@@ -11,10 +12,11 @@ namespace hhtdae
 namespace
 {
 
-/* rad, of a body in a step: the integrator truncates Magnus' series of the rotation vector (src/integrator/coordinates/rotations.cpp), and the error estimate contains only its next term */
+/* Largest rotation of a body in a step, rad: the integrator truncates Magnus' series of the rotation vector
+   (src/integrator/coordinates/rotations.cpp), and the error estimate contains only the first neglected term */
 constexpr double max_rotation_per_step = 1;
 
-/* Reduces *max_step to what the elements of this rank allow */
+/* Reduces *max_step to the upper bounds of the elements of this rank */
 PetscErrorCode LimitOfElements(Runtime &R, PetscReal t, Vec U, Vec V, Vec A, double *max_step)
 {
   const double       *u, *v, *a, *local[3];
@@ -45,7 +47,7 @@ PetscErrorCode LimitOfRotations(const Runtime &R, Vec V, double *max_step)
     if (TurnsInSpace(k.kind)) fastest = std::max(fastest, Eigen::Map<const Vector3>(v + k.first + 3).norm());
   }
   PetscCall(VecRestoreArrayRead(V, &v));
-  if (fastest > max_rotation_per_step / *max_step) *max_step = max_rotation_per_step / fastest; /* a product with *max_step may overflow */
+  if (fastest > max_rotation_per_step / *max_step) *max_step = max_rotation_per_step / fastest; /* fastest times *max_step may overflow */
   PetscFunctionReturn(0);
 }
 

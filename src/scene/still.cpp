@@ -15,8 +15,8 @@ StillSystem::~StillSystem()
   for (Vec *x : {&U, &V, &A, &zero, &F, &d, &next}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
 }
 
-/* Same order as in the integrator: KLU on one rank; else MUMPS through "mumpsnd", which enlarges its workspace when pivots change with the
-   length of a step (AnalysesRanks.HangingChain) */
+/* The packages are chosen in the same order as in the integrator: KLU on one rank, else MUMPS through "mumpsnd", which
+   enlarges its workspace when pivots change with the length of a step (AnalysesRanks.HangingChain) */
 PetscErrorCode ChoosePackage(Mat J, PC pc)
 {
   PetscFunctionBegin;
@@ -50,7 +50,7 @@ PetscErrorCode StillSystem::create(Vec begin, const char *prefix)
   PetscFunctionReturn(0);
 }
 
-/* |x|, or infinity for NaN, so that a maximum is defined */
+/* |x|, or infinity for NaN, so that maxima are defined */
 static double Size(double x) { return std::isnan(x) ? INFINITY : std::abs(x); }
 
 PetscErrorCode StillSystem::measure(Vec x, Unbalanced &out) const

@@ -1,4 +1,4 @@
-/* The callbacks and the run that connect a scene to PETSc's TS. */
+/* Connects a scene to PETSc's TS: callbacks, and the run that the TS owns. */
 #include "hhtdae/analyses.h"
 #include "extension.h"
 #include "guard.h"
@@ -11,8 +11,9 @@ namespace hhtdae
 namespace
 {
 
-/* Other TS types than TSHHT3 do not report accepted states: a changed number of steps does, since their solution is the last accepted state while they solve for the next.
-   Local rotation vectors need TSHHT3, which renews their references in every step. */
+/* TS types other than TSHHT3 do not report accepted states. When their step number has changed, a state has been
+   accepted: the solution of the TS is that state while they solve for the next one. Local rotation vectors require
+   TSHHT3, which renews their references in every step. */
 PetscErrorCode FollowAcceptedSteps(TS ts, Runtime &R)
 {
   PetscBool ours;
@@ -64,7 +65,7 @@ PetscErrorCode I2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv,
   PetscFunctionReturn(0);
 }
 
-/* -ts_view shows the scene, too */
+/* Makes -ts_view show the scene, too */
 PetscErrorCode ViewWithTS(const Runtime &R, TS ts)
 {
   PetscOptions      options;
@@ -81,7 +82,7 @@ PetscErrorCode ViewWithTS(const Runtime &R, TS ts)
   PetscFunctionReturn(0);
 }
 
-/* Checks dropped rows at the end of the last step; all others are checked at the beginning of the next */
+/* Checks dropped rows at the end of the last step; at the end of other steps they are checked when the next step begins */
 PetscErrorCode CheckEnd(Runtime &R, TS ts)
 {
   PetscReal t;
@@ -93,8 +94,8 @@ PetscErrorCode CheckEnd(Runtime &R, TS ts)
   PetscFunctionReturn(0);
 }
 
-/* With -ts_exact_final_time interpolate PETSc writes the solution at the final time only into a vector of the caller. Here it becomes the solution of the TS,
-   with its velocities and time. */
+/* With -ts_exact_final_time interpolate TSSolve() writes the solution at the final time only to a vector of the caller.
+   Here it becomes the solution of the TS, together with velocities and time. */
 PetscErrorCode SolveWithFinalTime(TS ts)
 {
   TSExactFinalTimeOption option;
@@ -153,12 +154,12 @@ PetscErrorCode AttachToTS(TS ts, std::unique_ptr<Runtime> R)
   PetscFunctionReturn(0);
 }
 
-/* Nodes of extensions, for the preconditioner -pc_type hhtconstraint */
+/* Attaches the nodes of extensions to the TS, for the preconditioner -pc_type hhtconstraint */
 PetscErrorCode SetNodesOfExtensions(const Runtime &R, TS ts)
 {
   std::vector<PetscInt> rows;
   IS                    nodes;
-  Vec                   zero; /* positions of the nodes at zero coordinates: the coordinates themselves are positions */
+  Vec                   zero; /* positions of the nodes for zero coordinates: zero, because the coordinates are positions */
   PetscFunctionBegin;
   if (R.scene.extensions.empty()) PetscFunctionReturn(0);
   for (const auto &x : R.scene.extensions)
@@ -251,7 +252,8 @@ PetscErrorCode Scene::solve(TS ts)
   PetscCall(AttachOutput(*R, output_, ts));
   PetscCall(OutputIsAttached(ts));
   const PetscErrorCode failed = SolveWithFinalTime(ts);
-  /* output sampled before a failure is written on one rank only: if other ranks have not failed, a collective call would wait for ever */
+  /* After a failure the output sampled so far is written on one rank only: with several ranks, some may not have failed,
+     and a collective call would wait forever */
   if (!failed || R->size == 1) PetscCall(FinishOutput(*R));
   PetscCall(failed);
   PetscCall(CheckEnd(*R, ts));

@@ -1,4 +1,4 @@
-/* Names of unknowns and their rows, for messages of the integrator. */
+/* Names of unknowns and of their equations, for messages of the integrator. */
 #include "extension.h"
 #include "model.h"
 #include "start.h"
@@ -20,7 +20,8 @@ std::string NameOfCoordinate(const SceneData &s, const BodyData &b, PetscInt k)
   return k < all ? "rotation " + std::to_string(k - positions + 1) + of : "mode " + std::to_string(k - all + 1) + of;
 }
 
-/* Name of the k-th multiplier of a constraint, dropped ones not counted, or force state; row: number of the part's first row in the element */
+/* Name of the k-th multiplier of a constraint, dropped ones not counted, or of the k-th force state; row: number of the
+   part's first row in the element */
 std::string NameOfPart(const SceneData &s, PetscInt element, const Part &p, PetscInt k, int row)
 {
   const ElementData &e = s.elements[element];
@@ -36,7 +37,7 @@ std::string NameOfPart(const SceneData &s, PetscInt element, const Part &p, Pets
 std::string NameOfElement(const SceneData &s, PetscInt row)
 {
   for (std::size_t e = 0; e < s.elements.size(); e++) {
-    int before[2] = {0, 0}; /* rows of earlier parts, of forces and constraints */
+    int before[2] = {0, 0}; /* numbers of rows of previous parts: of forces (0) and of constraints (1) */
     for (const Part &p : s.elements[e].parts) {
       const PetscInt k = p.index < (PetscInt)p.store->start.size() ? row - p.store->start[p.index] : -1; /* elements added after the set-up have no unknowns */
       int           &n = before[p.store->isConstraint()];

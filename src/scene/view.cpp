@@ -1,4 +1,4 @@
-/* Lists the contents of a scene, and the features that it does not use and that therefore cost nothing: -scene_view, -ts_view. */
+/* Lists the contents of a scene, and the features that it does not use, which therefore cost nothing (-scene_view, -ts_view). */
 #include "extension.h"
 #include "runtime.h"
 #include "start.h"
