@@ -2,12 +2,12 @@
   The relative angle of marker i about z_j, and the advance of i along an axis of j: values, rates, gradients and
   curvatures, shared by motions, couplers and torsional springs.
 
-  Angle: of the projection of x_i on the xy plane of j, from x_j, positive about z_j,
+  The angle is that of the projection of x_i on the xy plane of j, from x_j, positive about z_j,
 
     theta = atan2(x_i . y_j, x_i . x_j),    d theta = g . (d theta_i - d theta_j),    g = (z_j - h x_i)/(1 - h^2),  h =
   x_i . z_j,
 
-  exact also if the z axes are not parallel; g = z_j if they are. The angle is undefined if x_i is along z_j:
+  This is exact even if the z axes are not parallel; if they are, g = z_j. The angle is undefined if x_i is along z_j:
   derivatives are then not finite, and the step fails.
 */
 #ifndef HHTDAE_SCENE_KERNELS_ANGLE_H
@@ -22,13 +22,13 @@ namespace hhtdae
 
 constexpr double kTurn = 6.283185307179586477;
 
-/* theta + 2 pi n, with the n for which it is nearest to `near` */
+/* theta + 2 pi n with the integer n that makes it nearest to `near` */
 template <class T> T Unwind(const T &theta, double near)
 {
   return theta + T(kTurn * std::round((near - Plain(theta)) / kTurn));
 }
 
-/* In (-pi, pi]; values within rounding of -pi become pi (CountedAngles.HalfATurnAtTheStart) */
+/* The angle in (-pi, pi]; values within rounding of -pi become pi (CountedAngles.HalfATurnAtTheStart) */
 template <class T> T PrincipalAngle(const Frame<T> &i, const Frame<T> &j)
 {
   const T s = i.R.col(0).dot(j.R.col(1)), c = i.R.col(0).dot(j.R.col(0));
@@ -37,14 +37,13 @@ template <class T> T PrincipalAngle(const Frame<T> &i, const Frame<T> &j)
   return Plain(theta) < -kTurn / 2 + 1e-12 ? theta + T(kTurn) : theta;
 }
 
-/* The angle over full turns: the value within half a turn of `remembered`, the angle at the last accepted
- * step */
+/* The angle with full turns: the value within half a turn of `remembered`, which is the angle at the last accepted step */
 template <class T> T UnwoundAngle(const Frame<T> &i, const Frame<T> &j, double remembered)
 {
   return Unwind<T>(PrincipalAngle<T>(i, j), remembered);
 }
 
-/* g: the derivative of the angle for rotations of i; the negative of that for rotations of j */
+/* g, the derivative of the angle by rotations of i; the derivative by rotations of j is -g */
 template <class T> Vec3<T> AngleGradient(const Frame<T> &i, const Frame<T> &j)
 {
   const T       h = i.R.col(0).dot(j.R.col(2)), k = T(1) / (T(1) - h * h);
@@ -52,15 +51,15 @@ template <class T> Vec3<T> AngleGradient(const Frame<T> &i, const Frame<T> &j)
   return n * k;
 }
 
-/* Time, s, in which an angle with this rate and acceleration changes by two radians. Unwinding needs less than half a turn between accepted steps; the margin is
-   for rates that grow */
+/* Time, s, in which an angle with this rate and acceleration changes by two radians. Counting full turns requires a
+   change of less than half a turn between accepted steps; the difference is a margin for rates that grow */
 inline double LongestTurn(double rate, double acceleration)
 {
   const double fast = std::fabs(rate) + std::sqrt(rate * rate + 4 * std::fabs(acceleration));
   return fast > 0 ? 4 / fast : std::numeric_limits<double>::infinity(); /* also if the rate is NaN */
 }
 
-/* the exact time derivative of the angle */
+/* The exact time derivative of the angle */
 template <class T> T AngleRate(const Frame<T> &i, const Frame<T> &j, const Twist<T> &wi, const Twist<T> &wj)
 {
   const Vec3<T> g = AngleGradient<T>(i, j), w = wi.w - wj.w;
@@ -78,20 +77,20 @@ inline void AngleCurvature(const Frame<double> &i, const Frame<double> &j, Mat3<
   Gj                   = -k * (A + Cross<double>(z));
 }
 
-/* whether the angle is well defined there: x_i at least about one degree off z_j */
+/* Whether the angle is well defined: x_i and z_j enclose at least about one degree */
 inline bool AngleDefined(const Frame<double> &i, const Frame<double> &j)
 {
   return std::abs(i.R.col(0).dot(j.R.col(2))) < 0.9998;
 }
 
-/* component of x_i - x_j along axis a of j */
+/* The component of x_i - x_j along an axis of j */
 template <class T> T Advance(const Frame<T> &i, const Frame<T> &j, int axis)
 {
   const Vec3<T> u = i.x - j.x;
   return u.dot(j.R.col(axis));
 }
 
-/* its exact time derivative, the rotation of j's axis included */
+/* Its exact time derivative, including the rotation of j's axis */
 template <class T> T AdvanceRate(const Frame<T> &i, const Frame<T> &j, const Twist<T> &wi, const Twist<T> &wj, int axis)
 {
   const Vec3<T> e = j.R.col(axis), u = i.x - j.x, v = wi.v - wj.v, m = e.cross(u);
@@ -99,7 +98,7 @@ template <class T> T AdvanceRate(const Frame<T> &i, const Frame<T> &j, const Twi
   return along + turning;
 }
 
-/* Gradient as a row and curvature, both times `factor`, of the markers' 12 directions (x_i, theta_i, x_j, theta_j) */
+/* Add the gradient (a row) or the curvature of angle and advance, times `factor`; columns are the 12 directions (x_i, theta_i, x_j, theta_j) */
 template <class Row> void AddAngleGradient(const Frame<double> &i, const Frame<double> &j, double factor, Row &&J)
 {
   const Vec3<double> g = factor * AngleGradient<double>(i, j);
@@ -138,7 +137,7 @@ void AddAdvanceCurvature(const Frame<double> &i, const Frame<double> &j, int axi
   H.template block<3, 3>(9, 9) += Cross<double>(u) * E;
 }
 
-/* block (a, b) of those curvatures, for Constraint::curved(), with a and b in 0..3 */
+/* Whether block (a, b) of these curvatures can be nonzero, for Constraint::curved(); a and b are in 0..3 */
 constexpr bool AngleCurved(int a, int b) { return (a == 1 || a == 3) && (b == 1 || b == 3); }
 constexpr bool AdvanceCurved(int a, int b) { return (a == 3 && b != 1) || (b == 3 && a != 1); }
 

@@ -1,27 +1,26 @@
 /*
-  A two-node Timoshenko beam from j (x = 0) to i (x = L) along the x axes of the markers, linear in a frame that goes
-  along with it.
+  A two-node Timoshenko beam from j (x = 0) to i (x = L) along the x axes of the markers, linear in a co-rotated frame.
 
   The co-rotated frame is the mean frame of the two markers, halfway on the rotation from j to i, E = R_j exp([phi]/2),
   which treats both ends alike. In its axes, with d = x_i - x_j,
 
     u = d - (L, 0, 0)    relative displacement,        phi    relative rotation, half of it at each end
 
-  and as the mean rotation vanishes the 12 x 12 stiffness of the linear element (Przemieniecki 1968, with the shear
+  The mean rotation in this frame is zero. So the 12 x 12 stiffness of the linear element (Przemieniecki 1968, with the shear
   parameters Phi_y = 12 E I_zz/(G A_y L^2), Phi_z = 12 E I_yy/(G A_z L^2)) becomes diagonal in (u, phi):
 
     K_u   = EA/L,  12 E I_zz/((1 + Phi_y) L^3),  12 E I_yy/((1 + Phi_z) L^3)
     K_phi = GJ/L,  E I_yy/L,  E I_zz/L
 
-  The potential is u^T K_u u/2 + phi^T K_phi phi/2. With stress resultants n = K_u (u + zeta u'), q = K_phi (phi + zeta
-  phi'), zeta the damping and u', phi' exact rates in the moving frame, virtual work gives, by the differentials of E
-  and phi,
+  The potential is u^T K_u u/2 + phi^T K_phi phi/2. The stress resultants are n = K_u (u + zeta u'), q = K_phi (phi + zeta
+  phi'), with the damping zeta, s, and the exact rates u', phi' in the moving frame. The principle of virtual work, with the differentials of E
+  and phi, gives
 
     f   = -n                                                   force on i
     m_i = (s - HalfTan s x phi)/2 - P q,   s = d x n           moment on i about its origin; P: phi' = P (w_i - w_j)
 
-  in the axes E, for displacements and rotations of the whole of any size. Relative rotations of the two ends must stay
-  below half a turn, and are accurate when they are moderate: bending a beam far takes several elements.
+  in the axes E. Displacements and rotations of the whole beam may be arbitrarily large. The relative rotation of the two ends must stay
+  below half a turn, and the element is accurate for moderate relative rotations: large bending requires several elements.
 */
 #ifndef HHTDAE_SCENE_KERNELS_BEAM_H
 #define HHTDAE_SCENE_KERNELS_BEAM_H
@@ -40,7 +39,7 @@ template <bool Damped> struct BeamForce : RelativeForce<BeamForce<Damped>, Dampe
     double  damping;
   };
 
-  /* shear areas of zero: no shear deformation (Euler and Bernoulli) */
+  /* The data of a cross-section. Shear areas of zero mean no shear deformation (Euler-Bernoulli beam) */
   static Data section(double L, double E, double G, double area, double Iyy, double Izz, double J, double shear_y,
                       double shear_z, double damping)
   {

@@ -1,13 +1,13 @@
 /*
-  Bushing: in j's axes, with displacement d of i's origin from j's, rotation vector phi of i in j, and their rates,
+  Bushing. In j's axes, with the displacement d of i's origin from j's origin and the rotation vector phi of i relative to j,
 
     f = f_0 - K d - C d'                          on i, d' = the velocity of i's origin seen by an observer on j
     m = -B(phi)^T (K_t phi - m_0) - C_t w         on i about i's origin, w = the angular velocity of i relative to j
 
-  d phi = B(phi) d theta, so that the moment is the one conjugate to the rotation vector and everything but the damping
-  derives from the potential  d^T K d/2 - f_0 . d + phi^T K_t phi/2 - m_0 . phi. B^T = 1 + [phi]/2 + O(phi^2): for small
-  rotations, and for any rotation where K_t is isotropic and m_0 zero, m = m_0 - K_t phi - C_t w. phi ends at half a
-  turn. The choice of j's axes is not symmetric in i and j; it is the usual one.
+  where d phi = B(phi) d theta. The moment is conjugate to the rotation vector, so that all terms but the damping have the
+  potential  d^T K d/2 - f_0 . d + phi^T K_t phi/2 - m_0 . phi. Since B^T = 1 + [phi]/2 + O(phi^2), m = m_0 - K_t phi - C_t w holds for small
+  rotations, and for any rotation if K_t is isotropic and m_0 is zero. |phi| must stay below half a
+  turn. The usual choice of j's axes is not symmetric in i and j.
 */
 #ifndef HHTDAE_SCENE_KERNELS_BUSHING_H
 #define HHTDAE_SCENE_KERNELS_BUSHING_H
@@ -51,7 +51,7 @@ template <bool Damped> struct BushingForce : RelativeForce<BushingForce<Damped>,
     }
   }
 
-  /* of the springs and preloads */
+  /* Potential energy of the springs and preloads */
   static double energy(const Data &p, const Frame<double> *f)
   {
     Mat3<double> E;

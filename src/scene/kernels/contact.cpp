@@ -6,7 +6,7 @@ namespace hhtdae
 namespace
 {
 
-/* F and its derivatives by depth, normal and slip velocity */
+/* Returns F; L: its derivatives by depth, normal and slip velocity */
 Vector3 LawDerivatives(const ContactLaw &law, const Touch<double> &t, const Vector3 &v, Matrix<3, 7> &L)
 {
   using T = Dual<7>;

@@ -1,9 +1,9 @@
 /*
-  Contact of two shapes as a force kernel: Contact<Shape>, Shape from contact_shapes.h, force by contact_law.h.
+  Contact of two shapes as a force kernel, Contact<Shape>, with a Shape of contact_shapes.h and the force of contact_law.h.
 
-  Components: the contact force on i's body along the axes of j (between spheres: along the space axes); it acts at the
-  contact point, and so does its reaction on j's body. While the bodies do not touch, only the gap is evaluated, in plain numbers,
-  in the Jacobian as well.
+  The components are the contact force on i's body in the axes of j (between spheres: in space axes). The force and its reaction on
+  j's body act at the contact point. While the bodies do not touch, only the gap is evaluated, with plain numbers, also for the
+  Jacobian.
 */
 #ifndef HHTDAE_SCENE_KERNELS_CONTACT_H
 #define HHTDAE_SCENE_KERNELS_CONTACT_H
@@ -34,13 +34,14 @@ struct ContactMovement {
   Matrix<3, 12> normal, point;
 };
 
-/* The force on i at slip velocity v, and the derivatives of both wrenches, by the chain rule: the law along the 7 of (d, n, v) */
+/* Returns the force on i for the slip velocity v. frames, twists: derivatives of both wrenches, by the chain rule from
+   the derivatives of the law by the seven numbers (d, n, v) */
 Vector3 ContactDerivatives(const ContactLaw &law, const Touch<double> &t, const Vector3 &v, const ContactMovement &by, const Frame<double> *f,
                            const Twist<double> *w, Matrix<12, 12> &frames, Matrix<12, 12> &twists);
 
 template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
   static constexpr const char *name           = Shape::name;
-  static constexpr bool        needs_rotation = Shape::axes_of_j; /* spheres have no axes */
+  static constexpr bool        needs_rotation = Shape::axes_of_j; /* spheres do not depend on the axes of markers */
   struct Data {
     typename Shape::Data shape;
     ContactLaw           law;
@@ -57,7 +58,7 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     return Plain(t.depth) > 0;
   }
 
-  /* velocity of i's material at p relative to that of j's */
+  /* Velocity of i's material point at p relative to that of j */
   template <class T> static Vec3<T> slip(const Frame<T> *f, const Twist<T> *w, const Vec3<T> &p)
   {
     const Vec3<T> ri = p - f[0].x, rj = p - f[1].x;
@@ -90,7 +91,7 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     place<T>(f, t.p, F, on);
   }
 
-  /* Upper bound on the step, for shapes that define through(), the largest penetration at the end of a step */
+  /* Upper bound on the step, s, for shapes that define through(), the largest penetration allowed at the end of a step */
   template <class S = Shape, class = decltype(S::through(std::declval<const typename S::Data &>()))>
   static double longestStep(const Data &d, const Frame<double> *f, const Twist<double> *w, double acceleration, double)
   {
@@ -99,14 +100,14 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     return LongestApproach(Shape::through(d.shape), t.depth, -t.n.dot(slip<double>(f, w, t.p)), acceleration);
   }
 
-  /* potential energy of the elastic part of the force */
+  /* Potential energy of the elastic part of the force */
   static double energy(const Data &d, const Frame<double> *f)
   {
     Touch<double> t;
     return touches<double>(d, f, t) ? ElasticEnergy(d.law, t.depth) : 0;
   }
 
-  /* force F on i, -F on j, both at p */
+  /* The wrenches of the force F on i and -F on j, both at the point p */
   template <class T> static void place(const Frame<T> *f, const Vec3<T> &p, const Vec3<T> &F, Wrench<T> *on)
   {
     const Vec3<T> ri = p - f[0].x, rj = p - f[1].x;

@@ -5,10 +5,10 @@
     F = N n - mu N tanh(|v_t|/v_s) v_t/|v_t|,    N = k d^e g(1 + c d'),    v_t = v - (n.v) n
 
   Hunt and Crossley, "Coefficient of restitution interpreted as damping in vibroimpact", J. Appl. Mech. 42 (1975): the
-  damping is a factor of the elastic force, so that N starts and ends at zero. Their law has 1 + c d' in place of g(1 +
-  c d') and pulls when the bodies part fast; g(s) is a twice continuously differentiable max(0, s). As g is monotone and
-  g(1) = 1, what N adds to the elastic force always takes energy. N is never negative. Coefficient of restitution at
-  impact speed u: about 1 - 2/3 c u.
+  damping multiplies the elastic force, so that N is zero when contact begins and ends. Their law has 1 + c d' instead of g(1 +
+  c d'), and the contact pulls when the bodies separate fast; g(s) is a twice continuously differentiable approximation of max(0, s), so that
+  N is never negative. Since g is monotone and g(1) = 1, the difference between N and the elastic force always dissipates energy. The
+  coefficient of restitution at impact speed u is about 1 - 2/3 c u.
 */
 #ifndef HHTDAE_SCENE_KERNELS_CONTACT_LAW_H
 #define HHTDAE_SCENE_KERNELS_CONTACT_LAW_H
@@ -22,7 +22,7 @@
 namespace hhtdae
 {
 
-/* max(0, s), exact outside |s| < w; in between the slope rises from 0 to 1 by the cubic 3 u^2 - 2 u^3 */
+/* g(s): equal to max(0, s) for |s| >= w; for |s| < w its slope rises from 0 to 1 as the cubic 3 u^2 - 2 u^3 */
 template <class T> T SmoothRamp(const T &s)
 {
   constexpr double w = 0.25;
@@ -46,19 +46,20 @@ template <class T> T ElasticForce(const ContactLaw &law, const T &d)
   return T(law.stiffness) * power;
 }
 
-/* elastic energy at d > 0: the integral of ElasticForce() */
+/* Elastic energy for d > 0, the integral of ElasticForce() */
 inline double ElasticEnergy(const ContactLaw &law, double d) { return law.stiffness * std::pow(d, law.exponent + 1) / (law.exponent + 1); }
 
-/* Upper bound on the step, s, so that bodies closing in at a speed do not pass through each other, beyond which there is no force: at its end the penetration is at most max_depth, or
-   0.25 max_depth more than now. Along a straight flight the distance is a convex function of time, so that it never decreases
-   faster than now. */
+/* Upper bound on the step, s, so that bodies that approach at the speed `closing` do not pass through each other to where
+   the law gives no force. At the end of the step the penetration is at most max_depth or, if that is larger, the present
+   one plus 0.25 max_depth. For uniform straight motion the distance is a convex function of time, so that it never
+   decreases faster than at present. */
 inline double LongestApproach(double max_depth, double depth, double closing, double acceleration)
 {
   const double distance = std::max(max_depth - depth, 0.25 * max_depth), speed = closing + std::sqrt(closing * closing + 2 * acceleration * distance);
   return speed > 0 ? 2 * distance / speed : std::numeric_limits<double>::infinity();
 }
 
-/* F for d > 0, in the axes of n and v */
+/* F for d > 0, in the same axes as n and v */
 template <class T> Vec3<T> ContactForce(const ContactLaw &law, const T &d, const Vec3<T> &n, const Vec3<T> &v)
 {
   const T approach = -n.dot(v);

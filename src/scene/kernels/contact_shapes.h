@@ -1,9 +1,9 @@
 /*
-  Pairs of shapes in contact, shape i on the first marker, shape j on the second. touch() gives the penetration
-  (negative: the gap), the unit normal from j to i and the contact point, all in space axes. Normal and point belong
-  together: the rate of penetration is -n.v with v the velocity of i's material at the contact point against that of
-  j's, for every motion of the markers. The contact point is the deepest point of shape i, so that a wheel of radius R
-  rolls at R w whatever its penetration; between two spheres it is the middle of the overlap.
+  Pairs of shapes in contact, shape i on the first marker, shape j on the second. touch() gives the penetration (negative: the
+  gap), the unit normal from j to i and the contact point, all in space axes. Normal and point are consistent: for every
+  motion of the markers the rate of penetration is -n.v, where v is the velocity of i's material at the contact point relative
+  to that of j. The contact point is the deepest point of shape i, so that a wheel of radius R rolls at the speed R w for any
+  penetration; between two spheres it is the middle of the overlap.
 */
 #ifndef HHTDAE_SCENE_KERNELS_CONTACT_SHAPES_H
 #define HHTDAE_SCENE_KERNELS_CONTACT_SHAPES_H
@@ -20,7 +20,7 @@ template <class T> struct Touch {
   Vec3<T> n, p;
 };
 
-/* A sphere at i; the plane through j's origin normal to an axis of j, matter below: z in space; y in the plane, where
+/* A sphere at i on the plane through j's origin, with matter below it. The normal of the plane is z_j in space, and y_j in a planar scene, where
    the "sphere" is a disc on the line along x_j */
 struct SpherePlaneShape {
   static constexpr const char *name      = "sphere on plane";
@@ -39,9 +39,8 @@ struct SpherePlaneShape {
   }
 };
 
-/* An ellipsoid with semiaxes a along i's axes: its lowest point above the plane is x_i - A m/|m|, m = A n, A = R_i
-   diag(a) R_i^T, as the gradient of the quadric is along n there; |m| is how far it reaches below x_i. m is never zero.
- */
+/* An ellipsoid with semiaxes a along i's axes. Its lowest point above the plane, where the gradient of the quadric is
+   along n, is x_i - A m/|m|, m = A n, A = R_i diag(a) R_i^T. The lowest point is |m| below x_i. m is never zero. */
 struct EllipsoidPlaneShape {
   static constexpr const char *name      = "ellipsoid on plane";
   static constexpr bool        axes_of_j = true;
@@ -68,10 +67,11 @@ struct EllipsoidPlaneShape {
   }
 };
 
-/* A torus about z_i: circle of radius R in i's xy plane, tube of radius r. With u the part of the plane's normal n that
-   lies in the xy plane of i, the circle reaches R |u| below x_i at x_i - R u/|u|. A torus that lies flat (u = 0) has no
-   lowest point: below |u| = 1e-3, which is a tilt of 0.06 degrees, |u| gives way to an even polynomial that joins it
-   with two derivatives and ends at 3/8 of it; the contact point then moves through the middle of the ring. */
+/* A torus about z_i: a circle of radius R in i's xy plane, and a tube of radius r. Let u be the projection of the plane's
+   normal n on the xy plane of i. The lowest point of the circle is x_i - R u/|u|, R |u| below x_i. A torus that lies flat
+   (u = 0) has no lowest point: for |u| < 1e-3, a tilt of 0.06 degrees, |u| is replaced by an even polynomial that is
+   twice continuously differentiable at |u| = 1e-3 and 3/8 of 1e-3 at u = 0; the contact point then moves through the
+   middle of the ring. */
 struct TorusPlaneShape {
   static constexpr const char *name      = "torus on plane";
   static constexpr bool        axes_of_j = true;
@@ -102,11 +102,10 @@ struct TorusPlaneShape {
   }
 };
 
-/* Two spheres, either outside the other; the normal vanishes, smoothly, where the centres coincide to 1e-6 of the radii
- */
+/* Two spheres, each outside the other. The length of the normal decreases smoothly to zero where the centres coincide to 1e-6 of the radii */
 struct SphereSphereShape {
   static constexpr const char *name      = "sphere on sphere";
-  static constexpr bool        axes_of_j = false; /* no plane or box: the force is given in space axes */
+  static constexpr bool        axes_of_j = false; /* the components of the force are in space axes */
   struct Data {
     double radius_i, radius_j;
   };
@@ -124,11 +123,11 @@ struct SphereSphereShape {
   }
 };
 
-/* A sphere at i against the box |x| <= half in j's axes. Outside, the nearest point of the box is i's centre clamped to
-   it: on a face, an edge or a corner, and depth and normal are continuous from one to the next (the normal's derivative
-   jumps). A centre that is inside the box is pushed out through the nearest face, and the normal jumps where two faces
-   are equally near: radius and stiffness must be large enough to keep the centre outside. half may be infinite along an
-   axis. */
+/* A sphere at i against the box |x| <= half in j's axes. If the sphere's centre is outside the box, the nearest point of
+   the box is the centre clamped to the box, on a face, an edge or a corner; depth and normal are continuous between these
+   (the normal's derivative jumps). A centre inside the box is pushed out through the nearest face, and the normal jumps
+   where two faces are equally near: radius and stiffness must be large enough to keep the centre outside. half may be
+   infinite along an axis. */
 struct SphereBoxShape {
   static constexpr const char *name      = "sphere on box";
   static constexpr bool        axes_of_j = true;
@@ -140,7 +139,7 @@ struct SphereBoxShape {
   {
     using std::sqrt;
     const Vec3<T> x = f[0].x - f[1].x, c = f[1].R.transpose() * x;
-    double        excess[3]; /* of |c| over half */
+    double        excess[3]; /* |c| - half along each axis */
     int           nearest = 0, out = 0;
     for (int k = 0; k < 3; k++) {
       excess[k] = std::abs(Plain(c(k))) - d.half[k];

@@ -3,7 +3,7 @@
   about the z axis of j_k, over full turns, or the advance of i_k along an axis of j_k. The first R terms are
   angles. Markers: i_1, j_1, i_2, j_2, ...
 
-  The sum is separable: gradient and curvature are those of the pairs, factor by factor. The row is "start minus sum",
+  Each term depends on its own pair of markers, so that gradient and curvature are those of the pairs times the factors. The row is "start minus sum",
   so that factor_k times the multiplier is the moment on i_k's body about z_j, or the force on it along the axis of j.
 */
 #ifndef HHTDAE_SCENE_KERNELS_COUPLER_H
@@ -22,10 +22,10 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
   using Gradient                      = typename Base::Gradient;
   using Hessian                       = typename Base::Hessian;
   struct Data {
-    double memory[N] = {}; /* angles at the last accepted step, unwound; zero for advances */
+    double memory[N] = {}; /* angles at the last accepted step, with full turns; zero for advances */
     double factor[N] = {};
     double start     = 0;
-    int    axis      = 2; /* of j, of the advances */
+    int    axis      = 2; /* axis of j for advances */
   };
 
   static constexpr unsigned depends = [] {
@@ -88,7 +88,7 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
       least = std::min(least, LongestTurn(AngleRate<double>(f[2 * k], f[2 * k + 1], w[2 * k], w[2 * k + 1]), angular));
     return least;
   }
-  /* takes the pose at the start as reference */
+  /* Sets memory and `start` from the pose at the start */
   static void begin(Data &d, const Frame<double> *f)
   {
     for (int k = 0; k < R; k++) d.memory[k] = PrincipalAngle<double>(f[2 * k], f[2 * k + 1]);
@@ -96,8 +96,8 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
   }
 };
 
-/* Advance along z_j minus pitch/(2 pi) angle keeps its initial value. Multiplier: force on i's body along z_j;
-   the moment about z_j is -pitch/(2 pi) times the force. */
+/* The advance along z_j minus pitch/(2 pi) times the angle keeps its initial value. Multiplier: force on i's body along z_j;
+   the moment about z_j is -pitch/(2 pi) times this force. */
 struct ScrewRow : Constraint<ScrewRow, 2, 1> {
   static constexpr const char *name   = "screw";
   static constexpr int         memory = 1, angles = 1;

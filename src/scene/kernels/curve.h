@@ -1,7 +1,7 @@
 /*
-  The origin of i on a curve fixed in j. The curve's parameter is not an unknown, but that of the closest point,
-  searched for from its value at the last accepted step. The rows are the distances n_r . (c - p), p = (axes of j)^T (x_i - x_j),
-  along the two normals of the curve; in a planar scene along z x tangent only. Multipliers: force on i's body along these
+  The origin of i stays on a curve fixed in j. The curve's parameter is not an unknown; it is that of the closest point,
+  found by a search from its value at the last accepted step. The rows are the distances n_r . (c - p), p = (axes of j)^T (x_i - x_j),
+  along the two normals of the curve, or in a planar scene along z x tangent only. Multipliers: force on i's body along these
   normals.
 */
 #ifndef HHTDAE_SCENE_CURVE_H
@@ -29,8 +29,7 @@ template <int R> struct OnCurve : Constraint<OnCurve<R>, 2, R> {
     data.curve->normalDistances(Local<T>(f), data.memory[0], R, phi);
   }
 
-  /* By the chain rule, with automatic differentiation by p only. dp = (axes of j)^T (dx_i - dx_j +
-   * [d] theta_j) */
+  /* By the chain rule, with automatic differentiation by p only; dp = (axes of j)^T (dx_i - dx_j + [d] theta_j), d = x_i - x_j */
   static void gradient(const Data &data, const Frame<double> *f, double, typename Base::Gradient &J)
   {
     const Vec3<double> local = Local<double>(f);

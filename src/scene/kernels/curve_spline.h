@@ -1,8 +1,8 @@
 /*
-  Space curves: a cubic spline c(s) through points over chord length, twice continuously differentiable, with two unit
-  normals that vary as smoothly.
+  Space curves: a cubic spline c(s) through points, with the chord length as parameter s, and two unit
+  normals; all are twice continuously differentiable.
 
-  An open curve has no curvature at its ends (natural spline) and is continued beyond them along its end tangents, still
+  An open curve has no curvature at its ends (natural spline) and continues beyond them along its end tangents, still
   twice continuously differentiable: a point that leaves the curve slides along a straight line. A closed curve is
   periodic.
 */
@@ -18,7 +18,7 @@
 namespace hhtdae
 {
 
-/* Cubic spline through vectors at knots; periodic: the last value is the first one again */
+/* Cubic spline through vectors at knots; if it is periodic, the last value repeats the first */
 class VectorSpline
 {
 public:
@@ -63,11 +63,12 @@ public:
   /* planar: in the xy plane, with one normal z x t */
   Curve(std::vector<Vec3<double>> points, bool closed, bool planar);
 
-  /* Error of the points as text, empty if there is none; a curve with an error must not be used */
+  /* What is wrong with the points, as text; empty if nothing. A curve with an error must not be used */
   const std::string  &error() const { return error_; }
   const VectorSpline &path() const { return path_; }
 
-  /* Parameter of the point of the curve closest to p: the global minimum, or by Newton's method the local one near s */
+  /* Parameter of the point of the curve closest to p: of the global minimum of the distance, or, given s, of the local
+     minimum near s, by Newton's method */
   double closest(const Vec3<double> &p) const;
   double closest(const Vec3<double> &p, double s) const;
 
@@ -92,8 +93,8 @@ public:
   }
 
   /*
-    n_r . (c(s) - p) at the point closest to p, near the parameter `near`: the distances of p from the curve along its
-    normals. s is a function of p by g = (p - c) . c' = 0; two steps of Newton's method in dual numbers from the plain root
+    phi_r = n_r . (c(s) - p), the distances of p from the curve along its normals at the closest point, near the parameter
+    `near`. s is a function of p by g = (p - c) . c' = 0; two steps of Newton's method in dual numbers from the plain root
     make its derivatives exact up to the third order.
   */
   template <class T> void normalDistances(const Vec3<T> &p, double near, int rows, T *phi) const

@@ -1,7 +1,7 @@
 /*
-  Friction in joints, from the joint's own reaction: the inputs z of these force kernels are the multipliers of the
-  joint's position rows, which are forces; their Euclidean norm is the load N of the bearing. Friction is mu N
-  tanh(s/v_s) against the slip velocity s of the surfaces, see friction_slip.h; a pin or ball of radius r slips at r
+  Friction in joints, computed from the reaction of the joint. The inputs z of these force kernels are the multipliers of the
+  joint's position rows, which are forces; their Euclidean norm is the load N of the bearing. The friction force is mu N
+  tanh(s/v_s) against the slip velocity s of the surfaces, see friction_slip.h. A pin or ball of radius r slips at r
   times the relative angular velocity.
 
   Not modelled: the multipliers of the joint's rotation rows, which are moments, increase the load of a bearing of finite
@@ -18,11 +18,12 @@ namespace hhtdae
 
 struct FrictionData {
   double coefficient, radius, slip_velocity;
-  int    axis; /* of j, of the translation */
+  int    axis; /* axis of j along which a translational joint slides */
 };
 
-/* |z|, without smoothing at zero: that would need a force scale, which depends on the unit of force and makes small loads vanish (JointFrictionKernel.GrowsWithTheLoadInAnyUnits).
-   At z = 0, an unloaded bearing, the derivatives are set to zero, the mean of those of opposite directions. */
+/* |z|, not smoothed at zero: smoothing would require a force scale, which would depend on the unit of force and remove
+   the friction of small loads (JointFrictionKernel.GrowsWithTheLoadInAnyUnits). At z = 0, an unloaded bearing, the
+   derivatives are set to zero, the mean of the derivatives in opposite directions. */
 template <int Rows, class T> T BearingLoad(const T *z)
 {
   using std::sqrt;
@@ -33,14 +34,14 @@ template <int Rows, class T> T BearingLoad(const T *z)
   return load;
 }
 
-/* velocity of i's origin relative to j's material there */
+/* Velocity of i's origin relative to the material of j at that point */
 template <class T> Vec3<T> SlidingVelocity(const Frame<T> *f, const Twist<T> *w)
 {
   const Vec3<T> x = f[0].x - f[1].x, v = w[0].v - w[1].v, turning = w[1].w.cross(x);
   return v - turning;
 }
 
-/* force F on i at its origin and moment m, with their reactions on j */
+/* The wrenches of a force F at i's origin and a moment m on i, with their reactions on j */
 template <class T> void PlaceSliding(const Frame<T> *f, const Vec3<T> &F, const Vec3<T> &m, Wrench<T> *on)
 {
   const Vec3<T> x = f[0].x - f[1].x, about_j = x.cross(F);
@@ -57,7 +58,7 @@ template <class T> void PlaceMoment(const Vec3<T> &m, Wrench<T> *on)
   on[1].m           = -m;
 }
 
-/* moment about z_j on i: -mu r N tanh(r w/v_s), w the relative angular velocity about z_j */
+/* Component: moment on i about z_j, -mu r N tanh(r w/v_s), where w is the relative angular velocity about z_j */
 template <int Rows> struct RevoluteFriction : Force<RevoluteFriction<Rows>, 2, 1> {
   static constexpr bool        may_be_force_states = false;
   static constexpr const char *name    = "friction in a revolute joint";
@@ -78,7 +79,7 @@ template <int Rows> struct RevoluteFriction : Force<RevoluteFriction<Rows>, 2, 1
   }
 };
 
-/* force along an axis of j on i: -mu N tanh(v/v_s) */
+/* Component: force on i along an axis of j, -mu N tanh(v/v_s) */
 template <int Rows> struct TranslationalFriction : Force<TranslationalFriction<Rows>, 2, 1> {
   static constexpr bool        may_be_force_states = false;
   static constexpr const char *name    = "friction in a translational joint";
@@ -100,8 +101,8 @@ template <int Rows> struct TranslationalFriction : Force<TranslationalFriction<R
   }
 };
 
-/* force along and moment about z_j on i. The surfaces slip along a helix, at (v, r w): friction mu N has that
-   direction, so that a turning shaft slides easily. */
+/* Components: force on i along z_j and moment about it. The surfaces slip along a helix, with the velocity (v, r w), and
+   the friction force has the opposite direction; so a rotating shaft slides easily. */
 struct CylindricalFriction : Force<CylindricalFriction, 2, 2> {
   static constexpr bool        may_be_force_states = false;
   static constexpr const char *name   = "friction in a cylindrical joint";
@@ -124,7 +125,7 @@ struct CylindricalFriction : Force<CylindricalFriction, 2, 2> {
   }
 };
 
-/* moment on i against the relative angular velocity w, in space axes: -mu r N tanh(r |w|/v_s) w/|w| */
+/* Components: moment on i in space axes against the relative angular velocity w, -mu r N tanh(r |w|/v_s) w/|w| */
 struct SphericalFriction : Force<SphericalFriction, 2, 3> {
   static constexpr bool        may_be_force_states = false;
   static constexpr const char *name    = "friction in a spherical joint";

@@ -1,6 +1,6 @@
 /*
-  Coulomb friction, regularized: a force of size mu N tanh(|v|/v_s) against the slip velocity v. The factor of v,
-  -(mu N/v_s) tanh(x)/x with x = |v|/v_s, is an analytic function of x^2, so nothing is singular at rest.
+  Regularized Coulomb friction: a force of magnitude mu N tanh(|v|/v_s) against the slip velocity v. The factor of v,
+  -(mu N/v_s) tanh(x)/x with x = |v|/v_s, is an analytic function of x^2, so that the force is smooth at v = 0.
 */
 #ifndef HHTDAE_SCENE_KERNELS_FRICTION_SLIP_H
 #define HHTDAE_SCENE_KERNELS_FRICTION_SLIP_H
@@ -26,7 +26,7 @@ template <class T> T TanhRatio(const T &y)
     return s;
   }
   const T x = sqrt(y);
-  if (plain > 400) return T(1) / x; /* tanh is 1 to rounding, and cosh in its derivative would overflow further out */
+  if (plain > 400) return T(1) / x; /* tanh is 1 to rounding; cosh in its derivative would overflow for larger arguments */
   const T ratio = tanh(x) / x;
   return ratio;
 }

@@ -14,7 +14,8 @@ template <class T> struct MarkerMotion {
   Vec3<T>  a, alpha;
 };
 
-/* A marker at s from the centre of mass of a body with R, v, w, a, alpha; space axes */
+/* Moves m from the centre of mass of a body, at r, to a marker with the position s relative to it: sets m.f.x and changes
+   m.w.v and m.a; space axes */
 template <class T> void Attach(const Vec3<T> &r, const Vec3<T> &s, MarkerMotion<T> &m)
 {
   const Vec3<T> ws = m.w.w.cross(s), wws = m.w.w.cross(ws), as = m.alpha.cross(s);
@@ -23,7 +24,7 @@ template <class T> void Attach(const Vec3<T> &r, const Vec3<T> &s, MarkerMotion<
   m.a += as + wws;
 }
 
-/* component of x in the axes of frame, or space axes */
+/* Component c of x in the axes of `frame`, or in space axes if it is null */
 template <class T> T ComponentIn(const MarkerMotion<T> *frame, const Vec3<T> &x, int c)
 {
   if (!frame) return x(c);
@@ -37,7 +38,7 @@ template <class T> Vec3<T> Difference(const Vec3<T> &x, const Vec3<T> *y)
   return x - *y;
 }
 
-/* j and frame may be null; remembered: angle at the last accepted step, see UnwoundAngle() */
+/* The value of a measure of markers. j and frame may be null; remembered: angle at the last accepted step, see UnwoundAngle() */
 template <class T>
 T MarkerMeasure(Measure::Kind kind, int component, double remembered, const MarkerMotion<T> &i, const MarkerMotion<T> *j,
                 const MarkerMotion<T> *frame)

@@ -1,16 +1,16 @@
 /*
-  Meshing teeth of two bodies on one carrier: with e the direction of the tooth force and P the pitch point, both fixed in the carrier,
-  the bodies' points at P have equal displacements along e,
+  Meshing teeth of two bodies on one carrier. The direction e of the tooth force and the pitch point P are fixed in the carrier.
+  The points of both bodies at P have equal displacements along e,
 
     start + s_2 - s_1 = 0,     s = e . d + m . phi,     m = (P - x) x e,
 
   where d is the displacement of a body's marker relative to the carrier, phi its rotation and x the marker's position. About the axis of a
-  wheel phi is the angle over full turns; about the other axes, and for a rack, it is zero by the joint of the body, and only its
-  derivatives matter: with them the load of the row on either body is exactly a force along e through P, and there is
-  no load on the carrier, so that the bearings carry the force. If a wheel's marker left its axis, s would no longer be the displacement,
-  but the joint's rows exclude that.
+  wheel, phi is the angle over full turns. About the other axes, and for a rack, the joint of the body keeps phi zero, and only the
+  derivatives of phi matter: because of them the load of the row on either body is exactly a force along e through P, and the row puts
+  no load on the carrier, so that the bearings carry the force. s is the displacement only as long as a wheel's marker stays on its axis,
+  which the rows of its joint ensure.
 
-  Frames: marker of body 1, of body 2, and the one on the carrier, with origin P and e as an axis. Multiplier: force on body 1 along e.
+  Frames: markers of body 1 and body 2, and the marker on the carrier, which has the origin P and e as an axis. Multiplier: force on body 1 along e.
 */
 #ifndef HHTDAE_SCENE_KERNELS_MESH_H
 #define HHTDAE_SCENE_KERNELS_MESH_H
@@ -31,13 +31,13 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
   static constexpr const char *name   = Rack ? "rack mesh" : "gear mesh";
   static constexpr int         memory = Rack ? 1 : 2;
   struct Data {
-    double   memory[2] = {}; /* angles of the wheels at the last accepted step, unwound */
+    double   memory[2] = {}; /* angles of the wheels at the last accepted step, with full turns */
     MeshSide side[2];
     double   start = 0;
-    int      axis  = 2; /* of the carrier's marker: e */
+    int      axis  = 2; /* number of the axis of the carrier's marker that is e */
   };
 
-  /* a body's marker in the carrier's axes */
+  /* A body's marker in the axes of the carrier's marker */
   template <class T> static Frame<T> onCarrier(const Frame<T> &body, const Frame<T> &carrier)
   {
     const Vec3<T> u = body.x - carrier.x;
@@ -49,9 +49,9 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
     return f;
   }
 
-  static Vec3<double> lever(const Vec3<double> &x, int axis) { return Vec3<double>::Unit(axis).cross(x); } /* (P - x) x e, P = 0 */
+  static Vec3<double> lever(const Vec3<double> &x, int axis) { return Vec3<double>::Unit(axis).cross(x); } /* (P - x) x e with P = 0 */
 
-  /* component c of (P - x) x e, for dual numbers, too */
+  /* Component c of (P - x) x e, also for dual numbers */
   template <class T> static T leverComponent(const Vec3<T> &x, int axis, int c)
   {
     const int a = (axis + 1) % 3, b = (axis + 2) % 3; /* e x x = -x_b a + x_a b, with (e, a, b) right-handed */
@@ -108,7 +108,7 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
     return least;
   }
 
-  /* Takes the pose at the start as reference; bearing: the joints' markers on the carrier */
+  /* Sets the data from the pose at the start; bearing: frames of the joints' markers on the carrier */
   static void begin(Data &d, const Frame<double> *f, const Frame<double> *bearing)
   {
     for (int k = 0; k < 2; k++) {
@@ -119,7 +119,7 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
     d.start = toothDisplacement<double>(d, f, 0) - toothDisplacement<double>(d, f, 1);
   }
 
-  /* Displacement at P along e per angle of a wheel, per advance of the rack along axis `along` of its bearing */
+  /* Displacement at P along e per angle of a wheel, and per advance of the rack along axis `along` of its bearing */
   static double perAngle(const Data &d, int k) { return lever(d.side[k].bearing, d.axis).dot(d.side[k].axes.col(2)); }
   static double perAdvance(const Data &d, int along) { return d.side[1].axes(d.axis, along); }
 };

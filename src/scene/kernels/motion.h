@@ -1,7 +1,7 @@
 /*
-  Motions: the angle of i about z_j, or the advance of i along an axis of j, follows f(t); or its rate does; or the rate
-  follows a first-order state w, w' = f(t). Rows are "wanted minus actual", so that the multiplier is the drive's moment
-  on i's body about z_j, or its force on i's body along the axis of j; j's body takes the opposite.
+  Motions: the angle of i about z_j, or the advance of i along an axis of j, is equal to f(t); or its rate is equal to f(t); or its rate is
+  equal to a first-order state w, w' = f(t). Rows are prescribed minus actual value, so that the multiplier is the moment of the drive
+  on i's body about z_j, or its force on i's body along the axis of j; the opposite load acts on j's body.
 */
 #ifndef HHTDAE_SCENE_KERNELS_MOTION_H
 #define HHTDAE_SCENE_KERNELS_MOTION_H
@@ -14,10 +14,10 @@ namespace hhtdae
 
 struct MotionData {
   TimeFunction function;
-  int          axis = 2; /* of j; of translations alone */
+  int          axis = 2; /* axis of j; only for translations */
 };
 
-/* ---- the driven coordinate: value, rate, gradient and curvature are those of couplers and springs ---- */
+/* ---- the driven coordinate: value, rate, gradient and curvature as in couplers and springs, angle.h ---- */
 
 struct TurnAboutZ {
   static constexpr unsigned depends = Rotation(0) | Rotation(1);
@@ -69,8 +69,7 @@ struct AdvanceAlongAxis {
 
 /* ---- f(t) - displacement = 0 ---- */
 
-/* The angle is unwound to the turn nearest to f(t), which determines the number of full turns: no memory is
- * needed. */
+/* The number of full turns is the one for which the angle is nearest to f(t), so that no memory is needed. */
 template <class K, class Moves> struct DrivenDisplacement : Constraint<K, 2, 1> {
   using Data                        = MotionData;
   using Base                        = Constraint<K, 2, 1>;
@@ -103,9 +102,9 @@ struct DrivenAdvance : DrivenDisplacement<DrivenAdvance, AdvanceAlongAxis> {
   static constexpr const char *name = "driven advance";
 };
 
-/* ---- f(t) - rate = 0, the time derivative of the same; or w - rate = 0 with a state w ---- */
+/* ---- f(t) - rate = 0, or w - rate = 0 with a state w; rate: time derivative of the displacement ---- */
 
-/* The row is J u with the gradient J of the displacement's row, so that its derivative for the frames is u^T dJ^T. */
+/* The rate is J u with the gradient J of the displacement's row and the twists u, so that its derivative by the frames is u^T dJ^T. */
 template <class K, class Moves> struct RateRow : VelocityConstraint<K, 2, 1> {
   using Data                        = MotionData;
   using Base                        = VelocityConstraint<K, 2, 1>;
@@ -138,7 +137,7 @@ template <class K, class Moves> struct DrivenRate : RateRow<K, Moves> {
   }
 };
 
-/* w is a first-order state of the scene, whose rate is the function of the motion; it is not evaluated here. */
+/* w is a first-order state of the scene; the equation w' = f(t) is a row of that state and not part of this kernel. */
 template <class K, class Moves> struct StateRate : RateRow<K, Moves> {
   static constexpr int inputs = 1;
 

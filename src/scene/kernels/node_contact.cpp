@@ -50,7 +50,7 @@ void NodesOnBody::load(Evaluation &ev, const Ball &x, const Wrench<double> *on) 
   ev.bodies.load(j, x.f[1], on[1].f, on[1].m);
 }
 
-/* Own blocks; then rows of the body by the columns of j's and the other way round; then j's own ones */
+/* Requests the blocks of the flexible body; then those with rows of this body and columns of j's body, and the reverse; then those of j's body */
 void NodesOnBody::pattern(const Bodies &B, Pattern &p, std::vector<PetscInt> &request) const
 {
   const PetscInt g    = B.body[body].group, h = B.body[B.marker[j].body].group;

@@ -1,9 +1,11 @@
 /*
-  Kept nodes of a flexible body as balls against one shape on a marker of another body: Contact<Shape> (contact.h) for every node, without a frame for any of them.
+  Contact of kept nodes of a flexible body, as balls, with one shape on a marker of another body: Contact<Shape> (contact.h)
+  for every node, without attachments' frames at the nodes.
 
-  A ball has the motion of its node and rotates with the floating frame: x = r + A (s + Phi eta). A bound on the displacement of any node by the modes,
-  sum_k |eta_k| max |phi_k|, excludes nodes that cannot touch; only for the others the product with the modes is computed. With the derivatives X of (x, theta) and V of
-  (v, w) by the body's position, angles and modes, and the derivatives K, C of the wrench by (x, theta) and (v, w), the matrix of a node is
+  A ball moves with its node and rotates with the floating frame: x = r + A (s + Phi eta). Nodes that cannot touch are
+  excluded by an upper bound on the displacement of all nodes by the modes, sum_k |eta_k| max |phi_k|; the product with the
+  modes is computed only for the other nodes. X and V are the derivatives of (x, theta) and (v, w) by the body's position,
+  angles and modes; K and C are the derivatives of the wrench by (x, theta) and (v, w). The matrix of a node is
 
     - L^T (K X + C V) - d(L^T (f, m))/dq for fixed (f, m),    L: X without the factor Bodies::inStep() of rotations
 */
@@ -18,39 +20,42 @@
 namespace hhtdae
 {
 
-/* Constant data, shared by the instances of all runs */
+/* Constant data, shared by all runs */
 struct ContactNodes {
   std::shared_ptr<const ModalBody> model; /* keeps the modes of the nodes alive */
   std::vector<const ModalNode *>   node;
-  Eigen::Matrix3Xd                 place; /* undeformed, from the centre of mass, body axes */
-  Eigen::VectorXd                  reach; /* largest displacement of a node per unit of each mode */
+  Eigen::Matrix3Xd                 place; /* undeformed positions relative to the centre of mass, body axes */
+  Eigen::VectorXd                  reach; /* for each mode: largest displacement of a node per unit of the modal coordinate */
 };
 std::shared_ptr<const ContactNodes> MakeContactNodes(std::shared_ptr<const ModalBody> model, const std::vector<PetscInt> &place);
 
-/* One element on this rank, without the shape, which is in NodeContactBatch */
+/* One element on this rank without its shape, which NodeContactBatch has */
 class NodesOnBody
 {
 public:
-  PetscInt                            body = -1, j = -1; /* local: the flexible body, the marker of the shape */
+  PetscInt                            body = -1, j = -1; /* local numbers of the flexible body and of the marker of the shape */
   std::shared_ptr<const ContactNodes> nodes;
 
   struct Ball {
     const Eigen::Matrix<double, 3, Eigen::Dynamic> *phi;
     Frame<double>                                   f[2];
     Twist<double>                                   w[2];
-    Vector3                                         arm, rate; /* from the body's origin; velocity that the modes give; space axes */
+    /* position relative to the body's origin, and velocity due to the modes, in space axes */
+    Vector3                                         arm, rate;
   };
-  /* upper bound on the displacement of any node by the deformation */
+  /* Upper bound on the displacement of all nodes by the deformation */
   double slack(const Evaluation &ev) const;
   Ball   ball(const Evaluation &ev, std::size_t k, const Frame<double> &fj, const Twist<double> &wj) const;
   void   load(Evaluation &ev, const Ball &b, const Wrench<double> *on) const;
 
-  /* ---- matrix; functions in the order of their calls for each instance ---- */
+  /* ---- the matrix; the functions are in the order in which they are called for each instance ---- */
   void pattern(const Bodies &B, Pattern &p, std::vector<PetscInt> &request) const;
-  /* sums over the balls that touch */
+  /* Sums over the balls that touch */
   struct Matrices {
-    Eigen::MatrixXd left, right;       /* 3 columns per ball, with reserve: transposed rows of its position in L, and of - (K X + C V) for the force on it */
-    Eigen::MatrixXd own, by_j, rate_j; /* own: rest of the body's own block; by_j, rate_j: columns x, theta and v, w of j's body */
+    /* three columns per ball, with spare capacity: the transposed rows of L for its position, and of - (K X + C V) for
+       the force on it */
+    Eigen::MatrixXd left, right;
+    Eigen::MatrixXd own, by_j, rate_j; /* own: other terms of the body's own block; by_j, rate_j: columns x, theta and v, w of j's body */
     Eigen::MatrixXd of_j;              /* rows of j's body */
     Six             jj, jj_rate;
     int             count = 0;
@@ -63,7 +68,7 @@ private:
   BodyKind kindOfJ(const Bodies &B) const { return B.body[B.marker[j].body].kind; }
 };
 
-/* Shapes of the other body, as these cull nodes: whether a ball within `slack` of an undeformed place can touch */
+/* Tests for each shape of the other body: whether a ball within the distance `slack` of an undeformed place can touch the shape */
 class NearPlane
 {
 public:
@@ -93,7 +98,8 @@ private:
 template <class Shape> struct NearOf;
 template <> struct NearOf<SpherePlaneShape> {
   using Test = NearPlane;
-  static double through(const SpherePlaneShape::Data &) { return std::numeric_limits<double>::infinity(); } /* there is no other side */
+  /* no bound: the matter below the plane has no other side */
+  static double through(const SpherePlaneShape::Data &) { return std::numeric_limits<double>::infinity(); }
 };
 template <> struct NearOf<SphereSphereShape> {
   using Test = NearSphere;
@@ -109,7 +115,7 @@ public:
   struct Instance {
     NodesOnBody           on;
     typename Kernel::Data data;
-    bool                  mine; /* this rank counts its energy */
+    bool                  mine; /* whether this rank adds its energy to the balance */
   };
   std::vector<Instance> all;
 
@@ -119,7 +125,7 @@ public:
   }
   Bodies *bodies = nullptr;
 
-  /* f(ball) for the nodes that may touch */
+  /* Calls f(ball) for the nodes that may touch */
   template <class F> static void nearOnes(const Evaluation &ev, const Instance &e, F f)
   {
     const Frame<double>       fj   = ev.bodies.template frame<true>(e.on.j);
@@ -170,7 +176,7 @@ public:
     return sum;
   }
 
-  /* as in contact.h, but up to the middle of both balls: a small one may be deep in a large one */
+  /* As in contact.h, except that the allowed penetration is up to the centres of both balls, because a small ball may be deep in a large one */
   bool   limitsSteps() const override { return !all.empty() && std::isfinite(Near::through(all[0].data.shape)); }
   double longestStep(const Evaluation &ev) const override
   {
