@@ -8,7 +8,7 @@ namespace hhtdae
 namespace
 {
 
-/* a planar scene bends the beam about z alone */
+/* Checks the cross-section; in a planar scene the beam bends about z only */
 void CheckSection(ElementBuilder &e, const Beam &s)
 {
   RequirePositive(e, "E", s.E);
@@ -31,7 +31,7 @@ void CheckSection(ElementBuilder &e, const Beam &s)
   RequireNotNegative(e, "damping", s.damping);
 }
 
-/* the markers' x axes run from j to i */
+/* Checks that the x axes of the markers point from j to i */
 void CheckPlacement(ElementBuilder &e, const Beam &s)
 {
   const Frame<double>    f[2] = {e.frame(s.i), e.frame(s.j)};

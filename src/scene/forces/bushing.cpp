@@ -8,7 +8,7 @@ namespace hhtdae
 namespace
 {
 
-/* Rotation vectors are discontinuous at half a turn: the start must be well below */
+/* The rotation at the start must be well below half a turn, where rotation vectors are discontinuous */
 void CheckRotation(ElementBuilder &e, const Bushing &s)
 {
   const Matrix3 R     = e.frame(s.j).R.transpose() * e.frame(s.i).R;
@@ -29,7 +29,7 @@ template <> Element Scene::enter(const std::string &name, const Bushing &s)
   RequireFinite(e, "force", s.force);
   RequireFinite(e, "moment", s.moment);
   RequireTwoBodies(e, s.i, s.j);
-  RequireTurning(e, s.j, "j"); /* the force acts at i, with a lever to j's origin */
+  RequireTurning(e, s.j, "j"); /* the force acts at i, which causes a moment about j's origin */
   const bool elastic = !s.torsional_stiffness.isZero(0) || !s.moment.isZero(0),
              viscous = !s.torsional_damping.isZero(0);
   if (elastic || viscous) RequireTurning(e, s.i, "i");

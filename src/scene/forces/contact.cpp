@@ -1,6 +1,6 @@
 /*
   Contact forces, kernels/contact.h. In planar scenes the plane is the line along x_j with matter on the side of
-  negative y, and spheres, ellipsoids and boxes are discs, ellipses and rectangles.
+  negative y_j, and spheres, ellipsoids and boxes are discs, ellipses and rectangles.
 */
 #include "scene/kernels/contact.h"
 #include "contact_requirements.h"
@@ -18,7 +18,7 @@ ElementBuilder Entry(Scene &scene, const std::string &name, const char *type, Ma
 {
   ElementBuilder e(scene, name, type, ElementData::Force, i, j);
   RequireTwoBodies(e, i, j);
-  /* without friction, the force on a sphere has no moment about the marker's origin */
+  /* Without friction, the force on a sphere has no moment about the marker's origin */
   if (law.friction != 0 || round == Round::No) RequireNoPoint(e, i, "i");
   if (law.friction != 0 || round != Round::Both) RequireNoPoint(e, j, "j");
   return e;
@@ -72,7 +72,7 @@ template <> Element Scene::enter(const std::string &name, const SphereBox &s)
   RequirePositive(e, "radius", s.radius);
   SphereBoxShape::Data shape{s.radius, {s.half(0), s.half(1), s.half(2)}};
   if (e.planar())
-    shape.half[2] = std::numeric_limits<double>::infinity(); /* the nearest face is never above or below */
+    shape.half[2] = std::numeric_limits<double>::infinity(); /* so that a face normal to z is never the nearest one */
   for (int k = 0; k < (e.planar() ? 2 : 3); k++) RequirePositive(e, Component("half length", k), s.half(k));
   e.load<Contact<SphereBoxShape>>({s.i, s.j}, {shape, CheckedLaw(e, s.law)}, {}, s.state);
   return e.done();

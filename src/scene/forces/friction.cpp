@@ -1,5 +1,5 @@
-/* Friction in joints: the kernel that fits the joint, with the multipliers of its position rows as inputs;
- * kernels/friction.h */
+/* Friction in joints: selects the kernel for the type of the joint, whose inputs are the multipliers of the joint's position rows;
+   kernels/friction.h */
 #include "scene/kernels/friction.h"
 #include "requirements.h"
 
@@ -13,7 +13,7 @@ template <class K> void Enter(ElementBuilder &e, const JointFriction &s, Marker 
 {
   std::vector<ScalarRef> load;
   for (int row = 0; row < K::inputs; row++)
-    load.push_back({ScalarRef::Multiplier, s.joint.id, row}); /* position rows come first */
+    load.push_back({ScalarRef::Multiplier, s.joint.id, row}); /* the position rows of the joint come first */
   e.load<K>({i, j}, {s.coefficient, s.radius, s.slip_velocity, axis}, load);
 }
 

@@ -1,6 +1,7 @@
 /*
-  Load cases of flexible bodies times a function of time or of the state. With the case's force f, moment m about the centre of mass and work q with the modes,
-  each of first order in eta (modal.h), and the body's axes A, a scale s adds s A f and s A m to the load of the floating frame and s q to that of the modes.
+  Load cases of flexible bodies times a scale s, a function of time or of the state. A load case has the force f, the moment m
+  about the centre of mass and the modal forces q, each of first order in eta (modal.h). With the body's axes A it adds s A f
+  and s A m to the load of the floating frame and s q to the load of the modes.
 */
 #include "requirements.h"
 #include "scene/expression_batch.h"
@@ -15,7 +16,7 @@ namespace
 
 /* A load case of one body, evaluated at a state of the body */
 struct CaseOnBody {
-  PetscInt             body = -1; /* local */
+  PetscInt             body = -1; /* local number */
   const ModalLoadCase *load = nullptr;
 
   struct Value {
@@ -41,7 +42,7 @@ public:
   struct Instance {
     CaseOnBody    on;
     LocalFunction scale;
-    Input         state; /* the scale as a force state */
+    Input         state; /* the scale, if it is a force state */
     bool          as_force_states;
   };
   std::vector<Instance> all;
@@ -104,7 +105,7 @@ private:
   const Bodies           &bodies_;
   LocalFunction::Gradient G_;
 
-  /* blocks between the body's position, angles and modes that are not zero, in the order of ownBlocks() */
+  /* The nonzero blocks between the body's position, angles and modes, in the order in which ownBlocks() adds them */
   static std::vector<std::array<int, 2>> own(const ModalLoadCase &l)
   {
     std::vector<std::array<int, 2>> blocks{{0, 1}, {1, 1}, {1, 2}};
@@ -121,7 +122,7 @@ private:
     ev.bodies.modal[ev.bodies.body[e.on.body].modal].load += s * x.q;
   }
 
-  /* - d load by the body's coordinates, without d(G^T m)/dq of the moment, which the body adds itself */
+  /* Adds - d load/dq for the body's coordinates q. Bodies::modalJacobian() adds d(G^T m)/dq for fixed moments m */
   static void ownBlocks(Evaluation &ev, const Instance &e, double s, const CaseOnBody::Value &x, const Slot *&slot)
   {
     const BodyMotion    &b = ev.bodies.now[e.on.body];
@@ -135,7 +136,7 @@ private:
     if (l.modal_gradient.size()) ev.sink.add(*slot++, Eigen::MatrixXd(-s * l.modal_gradient), m, m);
   }
 
-  /* minus the load for scale 1, times the derivatives of the scale */
+  /* Adds minus the load for scale 1, times the derivatives of the scale */
   void scaleColumns(Evaluation &ev, const Instance &e, const CaseOnBody::Value &x, const Slot *&slot) const
   {
     const BodyMotion     &b       = ev.bodies.now[e.on.body];
@@ -148,7 +149,7 @@ private:
   }
 };
 
-/* The scale as a component, and the load on the floating frame, for measures */
+/* For measures: the scale, which is the component, and the load on the floating frame */
 class ModalLoadProbe : public Probe
 {
 public:
@@ -238,7 +239,7 @@ template <> Element Scene::enter(const std::string &name, const ModalLoad &x)
 {
   SceneData &s        = data();
   const bool flexible = s.valid(x.body) && s.bodies[x.body.id].flexible;
-  if (!flexible) { /* there is no marker at which to enter it */
+  if (!flexible) { /* an ElementBuilder needs the marker of the floating frame, which does not exist */
     const Element none = absent(name);
     s.errors.push_back("modal load " + s.elements[none.id].name + ": its body is not a flexible one of this scene");
     return none;

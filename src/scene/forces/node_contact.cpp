@@ -10,7 +10,8 @@ namespace hhtdae
 namespace
 {
 
-/* For measures: resultant of all nodes about the body's centre of mass, and the load on the other body about its marker */
+/* For measures: the resultant of the forces on all nodes with the moment about the body's centre of mass, and the load on
+   the other body with the moment about its marker */
 template <class Shape> class NodeContactProbe : public Probe
 {
 public:
@@ -45,7 +46,7 @@ template <class Shape> class NodeContactStore : public StoreBase
 {
 public:
   struct Item {
-    PetscInt                            element = -1, marker[2] = {-1, -1}; /* on the floating frame, of the other shape */
+    PetscInt                            element = -1, marker[2] = {-1, -1}; /* markers on the floating frame and of the other shape */
     std::shared_ptr<const ContactNodes> nodes;
     typename Contact<Shape>::Data       data;
   };
@@ -86,7 +87,7 @@ private:
   }
 };
 
-/* Numbers of the nodes among the kept ones, each once */
+/* Numbers of the nodes among the kept nodes, without repetitions */
 std::vector<PetscInt> PlacesOf(ElementBuilder &e, const ModalBody &m, const NodeContact &s)
 {
   std::vector<PetscInt> places;
@@ -118,7 +119,7 @@ template <> Element Scene::enter(const std::string &name, const NodeContact &x)
 {
   SceneData &s        = data();
   const bool flexible = s.valid(x.body) && s.bodies[x.body.id].flexible;
-  if (!flexible) { /* there is no marker at which to enter it */
+  if (!flexible) { /* an ElementBuilder needs the marker of the floating frame, which does not exist */
     const Element none = absent(name);
     s.errors.push_back("node contact " + s.elements[none.id].name + ": its body is not a flexible one of this scene");
     return none;
@@ -128,7 +129,8 @@ template <> Element Scene::enter(const std::string &name, const NodeContact &x)
   if (!e.good()) return e.done();
   const PetscInt other = s.markers[x.j.id].body;
   e.require(other < 0 || s.bodies[other].carrier != x.body.id, "marker j is on the same flexible body " + s.bodyName(x.body.id));
-  if (x.radius_j == 0 || x.law.friction != 0) RequireNoPoint(e, x.j, "j"); /* only a sphere without friction has no moment */
+  /* only the force on a sphere without friction has no moment about its centre */
+  if (x.radius_j == 0 || x.law.friction != 0) RequireNoPoint(e, x.j, "j");
   if (x.radius_j == 0) RequireNotNegative(e, "radius", x.radius);
   else RequirePositive(e, "radius", x.radius);
   if (x.radius_j != 0) RequirePositive(e, "radius_j", x.radius_j);

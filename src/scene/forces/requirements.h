@@ -1,4 +1,4 @@
-/* Checks of numbers and markers when forces are entered, with error messages that say what to do */
+/* Checks of numbers and markers when forces are added, with error messages that say what to do */
 #ifndef HHTDAE_SCENE_FORCES_REQUIREMENTS_H
 #define HHTDAE_SCENE_FORCES_REQUIREMENTS_H
 
@@ -36,7 +36,7 @@ inline void RequireNotNegative(ElementBuilder &e, const std::string &what, const
   for (int k = 0; k < 3; k++) RequireNotNegative(e, Component(what, k), x(k));
 }
 
-/* The markers must be on different bodies: else action and reaction cancel */
+/* The markers must be on different bodies, since action and reaction on one body cancel */
 inline void RequireTwoBodies(ElementBuilder &e, Marker i, Marker j)
 {
   if (!e.good()) return;
@@ -47,7 +47,7 @@ inline void RequireTwoBodies(ElementBuilder &e, Marker i, Marker j)
 
 inline bool OnPoint(const ElementBuilder &e, Marker m) { return e.scene().turnless(e.scene().markers[m.id].body); }
 
-/* The body of m must be able to take a moment */
+/* It must be possible that a moment acts on the body of m */
 inline void RequireTurning(ElementBuilder &e, Marker m, const char *marker)
 {
   if (!e.good()) return;
@@ -56,7 +56,8 @@ inline void RequireTurning(ElementBuilder &e, Marker m, const char *marker)
                        ", which takes no moment; use a rigid body");
 }
 
-/* The same for a contact; its shape at a node of a flexible body rotates with the body's floating frame, which is allowed */
+/* The same for a contact, which is also allowed at a node of a flexible body without rotation: its shape rotates with the
+   floating frame of the body */
 inline void RequireNoPoint(ElementBuilder &e, Marker m, const char *marker)
 {
   const PetscInt b = e.good() ? e.scene().markers[m.id].body : -1;

@@ -40,7 +40,7 @@ template <> Element Scene::enter(const std::string &name, const TranslationalSto
 {
   ElementBuilder e(*this, name, "translational stop", ElementData::Force, s.i, s.j);
   RequireTwoBodies(e, s.i, s.j);
-  RequireTurning(e, s.j, "j"); /* the force at i is off its origin */
+  RequireTurning(e, s.j, "j"); /* the force acts at i's origin, which causes a moment about j's origin */
   e.require(s.axis >= 0 && s.axis < 3, "axis is " + std::to_string(s.axis) + ", must be 0, 1 or 2");
   StopData d = CheckedStop(e, s.lower, s.upper, s.law);
   d.axis     = e.slidingAxis(s.axis);

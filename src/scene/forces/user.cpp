@@ -22,7 +22,7 @@ template <class K> struct UserItem {
   typename K::Data        data;
 };
 
-/* Without force states: the inputs of the kernel are functions of the unknowns */
+/* Users' forces without force states: the inputs of the kernel are functions of the unknowns */
 template <class K> class UserBatch : public ReadingBatch<ForceBatchBase<K>>
 {
   using Base = ForceBatchBase<K>;
@@ -30,7 +30,7 @@ template <class K> class UserBatch : public ReadingBatch<ForceBatchBase<K>>
 
 public:
   using Base::bodies;
-  std::vector<LocalFunction> functions; /* of each instance */
+  std::vector<LocalFunction> functions; /* the components of each instance */
 
   void pattern(Pattern &p) override
   {
@@ -93,14 +93,14 @@ protected:
   }
 
 private:
-  LocalFunction::Gradient G_; /* of the components */
+  LocalFunction::Gradient G_; /* derivatives of the components */
 
   static void frames(const Evaluation &ev, const ForceInstance<K> &e, Frame<double> *f)
   {
     for (int k = 0; k < M; k++) f[k] = ev.bodies.template frame<true>(e.marker[k]);
   }
 
-  /* - d load / d components times d components / d arguments */
+  /* Adds - d load / d components times d components / d arguments */
   void argumentBlocks(Evaluation &ev, const ForceInstance<K> &e, const Frame<double> *f, const ForceJacobian<M, Z> &J,
                       const Columns &columns, const Slot *&slot) const
   {
@@ -122,7 +122,7 @@ private:
   }
 };
 
-/* Values and loads of the components, for measures */
+/* For measures: values of the components, and the loads */
 template <class K> class UserProbe : public Probe
 {
 public:
@@ -167,7 +167,7 @@ public:
   void localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const override
   {
     auto eliminated    = std::make_unique<UserBatch<K>>();
-    auto loads         = std::make_unique<ForceBatch<K>>(); /* loads of instances with force states */
+    auto loads         = std::make_unique<ForceBatch<K>>(); /* applies the loads of instances with force states */
     auto rows          = std::make_unique<ExpressionBatch>(*l.bodies);
     eliminated->bodies = loads->bodies = l.bodies;
     eliminated->of.store               = this;
@@ -225,7 +225,8 @@ void Enter(ElementBuilder &e, const std::vector<Marker> &markers, const typename
 
 } // namespace
 
-/* A planar scene has forces in its plane and moments about z: other components of users' forces are dropped; it is an error if they are constants other than zero. */
+/* Removes components of users' forces that are out of the plane of a planar scene, that is other than forces in the plane
+   and moments about z. It is an error if they are nonzero constants. */
 static void LeaveInPlane(ElementBuilder &e, std::vector<Expression> &force, std::vector<Expression> &moment)
 {
   const auto leave = [&](Expression &x, const char *what) {
@@ -240,10 +241,10 @@ static void LeaveInPlane(ElementBuilder &e, std::vector<Expression> &force, std:
   leave(moment[1], "the moment about y");
 }
 
-/* Components as measures and force states: forces first, then moments. */
+/* The order of components, for measures and force states, is: forces, then moments. */
 template <> Element Scene::enter(const std::string &name, const UserForce &s)
 {
-  /* the builder needs two markers; a force without reaction has only one */
+  /* ElementBuilder takes two markers; a force without reaction has only one */
   const bool     reaction = s.j.id != -1, framed = s.frame.id != -1;
   ElementBuilder e(*this, name, "user force", ElementData::Force, s.i, reaction ? s.j : Marker{}, reaction);
   UserWrenchData d;
@@ -254,7 +255,7 @@ template <> Element Scene::enter(const std::string &name, const UserForce &s)
   e.require(!s.force.empty() || !s.moment.empty(), "neither force nor moment is given");
   if (framed) e.require(s.frame, "marker `frame`");
   if (!s.moment.empty()) RequireTurning(e, s.i, "i");
-  if (reaction) RequireTurning(e, s.j, "j"); /* the force at i is off its origin */
+  if (reaction) RequireTurning(e, s.j, "j"); /* the reaction acts at i's origin, which causes a moment about j's origin */
   if (!e.good()) return e.done();
   std::vector<Expression> f = s.force, moment = s.moment;
   if (e.planar()) LeaveInPlane(e, f, moment);

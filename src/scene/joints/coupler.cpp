@@ -22,7 +22,7 @@ void CheckTerm(ElementBuilder &e, const Term &t, std::size_t k)
   if (e.good()) RequirePair(e, t.i, t.j, t.rotation, term + ": ");
 }
 
-/* In a planar scene translations are along x_j, z being out of the plane. */
+/* Adds the coupler's row. In a planar scene translations are along x_j, since z is normal to the plane. */
 template <int N, int R> void Constrain(ElementBuilder &e, const Terms &terms)
 {
   using K = CouplerRow<N, R>;
@@ -41,7 +41,7 @@ template <int N, int R> void Constrain(ElementBuilder &e, const Terms &terms)
     e.constrain<K>({terms[0].i, terms[0].j, terms[1].i, terms[1].j, terms[2].i, terms[2].j}, d);
 }
 
-/* the kernel whose first R terms are rotations */
+/* Selects the kernel whose number of rotations R, which are the first terms, is `rotations` */
 template <int N, int R = N> void Dispatch(ElementBuilder &e, const Terms &terms, int rotations)
 {
   if (rotations == R)
@@ -65,7 +65,7 @@ Element Couple(ElementBuilder &e, Terms terms)
 
 } // namespace
 
-/* Multiplier: moment on the first wheel's body about its z_j; on the second it is ratio times that. */
+/* Multiplier: moment on the first wheel's body about its z_j; the moment on the second wheel is ratio times the multiplier. */
 template <> Element Scene::enter(const std::string &name, const Gear &s)
 {
   ElementBuilder e(*this, name, "gear", ElementData::Joint, s.i1, s.j1);
@@ -74,7 +74,7 @@ template <> Element Scene::enter(const std::string &name, const Gear &s)
   return Couple(e, {{s.i1, s.j1, true, 1}, {s.i2, s.j2, true, s.ratio}});
 }
 
-/* Multiplier: force on the rack's body; the moment on the pinion's is -radius times that. */
+/* Multiplier: force on the rack's body; the moment on the pinion's body is -radius times the multiplier. */
 template <> Element Scene::enter(const std::string &name, const RackAndPinion &s)
 {
   ElementBuilder e(*this, name, "rack and pinion", ElementData::Joint, s.i1, s.j1);
@@ -83,7 +83,7 @@ template <> Element Scene::enter(const std::string &name, const RackAndPinion &s
   return Couple(e, {{s.i1, s.j1, true, -s.radius}, {s.i2, s.j2, false, 1}});
 }
 
-/* Multiplier: the load on the k-th joint over its factor. */
+/* Multiplier: the load on the k-th joint divided by its factor, the same for all k. */
 template <> Element Scene::enter(const std::string &name, const Coupler &s)
 {
   const bool     some = !s.terms.empty();

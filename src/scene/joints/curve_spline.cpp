@@ -11,8 +11,8 @@ namespace
 
 using Points = std::vector<Vec3<double>>;
 
-/* diagonal d, off-diagonals e (e[k] between k and k + 1), symmetric and diagonally dominant; x comes in as the
- * right-hand side */
+/* Solves a symmetric, diagonally dominant tridiagonal system: diagonal d, off-diagonals e (e[k] between k and k + 1); x is the
+   right-hand side on entry, the solution on return */
 void SolveTridiagonal(std::vector<double> d, const std::vector<double> &e, Points &x)
 {
   const std::size_t n = d.size();
@@ -27,7 +27,7 @@ void SolveTridiagonal(std::vector<double> d, const std::vector<double> &e, Point
   }
 }
 
-/* the same with a corner e[n - 1] between the last and the first, as A' + u v^T by the formula of Sherman and Morrison:
+/* The same with an additional entry e[n - 1] between the last and the first unknown, by the Sherman-Morrison formula for A' + u v^T with
    u = (g, 0, ..., corner), v = (1, 0, ..., corner/g), g = -d[0] */
 void SolveCyclic(std::vector<double> d, const std::vector<double> &e, Points &x)
 {
@@ -47,7 +47,7 @@ void SolveCyclic(std::vector<double> d, const std::vector<double> &e, Points &x)
 /* Second derivatives at the knots */
 Points SecondDerivatives(const std::vector<double> &s, const Points &y, bool periodic)
 {
-  const std::size_t   n = s.size() - 1; /* pieces */
+  const std::size_t   n = s.size() - 1; /* number of pieces */
   std::vector<double> d, e;
   Points             b, m(n + 1, Vec3<double>::Zero());
   const auto          h     = [&](std::size_t k) { return s[k + 1] - s[k]; };
@@ -94,7 +94,7 @@ VectorSpline::VectorSpline(std::vector<double> knots, const Points &y, bool peri
     p.start        = knots_[k];
     p.a << y[k], (y[k + 1] - y[k]) / h - h / 6 * (2 * m[k] + m[k + 1]), m[k] / 2, (m[k + 1] - m[k]) / (6 * h);
   }
-  /* straight continuation beyond the ends; in a periodic spline parameters get there only by rounding */
+  /* Straight lines continue the curve beyond its ends; in a periodic spline parameters are beyond the ends only by rounding */
   Vec3<double> c, c1, c2;
   for (std::size_t k : {std::size_t(0), n + 1}) {
     const double end = k == 0 ? knots_.front() : knots_.back(), u = k == 0 ? 0 : end - pieces_[n].start;
@@ -120,7 +120,7 @@ Curve::Curve(Points points, bool closed, bool planar) : planar_(planar)
   checkShape();
 }
 
-/* A closed curve may repeat its first point at the end; the repetition is dropped. */
+/* Checks the points; a closed curve may repeat its first point at the end, which is then removed. */
 bool Curve::checkPoints(Points &points, bool closed)
 {
   double size = 0;
@@ -148,9 +148,9 @@ bool Curve::checkPoints(Points &points, bool closed)
 }
 
 /*
-  The normal at nodes along the path, transported from node to node by the smallest rotation that takes one tangent into the
-  next; in a closed curve a rotation about the tangent, proportional to arc length, makes the normals of both ends equal. Between the nodes the normal is a
-  spline, of which the component normal to the tangent is used.
+  Computes the first normal at nodes along the path. The smallest rotation that takes a tangent into the next one transports
+  the normal from node to node. In a closed curve an additional rotation about the tangent, proportional to arc length, makes
+  the normals at both ends equal. Between the nodes the normal is a spline; its component normal to the tangent is used.
 */
 void Curve::transportNormal(bool closed)
 {
@@ -177,7 +177,7 @@ void Curve::transportNormal(bool closed)
   normal_ = VectorSpline(s, m, closed);
 }
 
-/* Too few points at a sharp bend lead to cusps and loops, without a tangent or a unique closest point. */
+/* An error if the curve has cusps or loops, where it has no tangent or no unique closest point: too few points at a sharp bend cause them. */
 void Curve::checkShape()
 {
   Vec3<double> c, c1, c2, m, m1, m2;
@@ -216,13 +216,13 @@ double Curve::closest(const Vec3<double> &p) const
   return closest(p, best);
 }
 
-/* Minimizes |p - c(s)|^2 / 2 by Newton's method, or Gauss-Newton steps if it is not convex; steps are at most as long as a piece and must
- * decrease the distance */
+/* Minimizes |p - c(s)|^2 / 2 by Newton's method, with Gauss-Newton steps where this function is not convex. Steps are at
+   most as long as the longest piece and must decrease the distance */
 double Curve::closest(const Vec3<double> &p, double s) const
 {
   Vec3<double> c, c1, c2;
   const double size = longest_ + path_.length() + p.norm();
-  if (!std::isfinite(size)) return s; /* of a diverged iteration: comparisons with NaN would not end the search */
+  if (!std::isfinite(size)) return s; /* p is from a diverged iteration; the search would not end, since comparisons with NaN are false */
   path_(s, c, c1, c2);
   for (int k = 0; k < 100; k++) {
     const double distance = (p - c).squaredNorm(), speed = c1.squaredNorm(), bend = speed - (p - c).dot(c2);

@@ -1,5 +1,5 @@
-/* Common part of joints between two markers: an ElementBuilder with the markers, which checks that bodies of markers whose axes are used can
- * rotate. */
+/* Common part of joints between two markers: an ElementBuilder that knows the markers and checks that moments can act on the bodies of
+   markers whose axes are used. */
 #ifndef HHTDAE_SCENE_JOINT_BUILDER_H
 #define HHTDAE_SCENE_JOINT_BUILDER_H
 
@@ -36,7 +36,7 @@ public:
             std::string(what) + " is " + Show(value) + ", must be positive and finite");
   }
 
-  /* Adds the rows of kernel K. If they depend on the axes of a marker, its body must be able to take moments. */
+  /* Adds the rows of kernel K. If they depend on the axes of a marker, it must be possible that moments act on its body. */
   template <class K> void rows(const typename K::Data &data = {})
   {
     for (int k = 0; k < 2 && good(); k++) {
@@ -47,12 +47,13 @@ public:
     if (good()) constrain<K>({marker_[0], marker_[1]}, data);
   }
 
-  /* Rows for axes that stay parallel or antiparallel, as they are described */
+  /* Adds rows for axes that stay parallel or antiparallel, as described */
   template <class K> void branchRows()
   {
     if (good()) rows<K>(K::branch(start(0), start(1)));
   }
-  /* Rows for all three axes. Axes that are nearer to a cyclic permutation, as by a mistake in the description, are an error (SceneCheck.MarkersWithOtherAxes) */
+  /* Adds rows for all three axes. It is an error if the axes of i are nearer to a cyclic permutation of those of j, which
+     indicates a mistake in the description (SceneCheck.MarkersWithOtherAxes) */
   template <class K> void orientationRows()
   {
     if (!good()) return;

@@ -1,7 +1,7 @@
 /*
-  Joints made of coincident points and parallel axes. Order of the multipliers: forces on i's body first, moments after
-  them. Forces act at i's origin. In planar scenes only the rows in the plane are left, and translation is along x_j, z
-  being out of the plane.
+  Joints of coincident points and parallel axes. The comment of each joint lists its multipliers in their order: forces on i's body,
+  which act at i's origin, then moments on it. Planar scenes have only the rows in the plane, and translation is along x_j, since z
+  is normal to the plane.
 */
 #include "joint_builder.h"
 #include "scene/kernels/convel.h"
@@ -43,8 +43,8 @@ template <> Element Scene::enter(const std::string &name, const Universal &s)
   return e.done();
 }
 
-/* Force in space axes; moment, see convel.h. The z axes may point the same way or away from each other; the start
- * decides. */
+/* Force in space axes; moment, see convel.h. The z axes may point in the same direction or away from each other, as at
+   the start. */
 template <> Element Scene::enter(const std::string &name, const ConstantVelocity &s)
 {
   JointBuilder e(*this, name, "constant velocity", s.i, s.j);

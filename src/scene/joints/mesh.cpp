@@ -1,4 +1,4 @@
-/* Gears and racks between two bodies on one carrier, whose force acts at the pitch point. */
+/* Gears and racks between two bodies on one carrier; the tooth force acts at the pitch point. */
 #include "scene/kernels/mesh.h"
 #include "scene/motions/moving_pair.h"
 
@@ -8,7 +8,8 @@ namespace hhtdae
 namespace
 {
 
-constexpr double parallel_sine = 1e-6; /* sine of the largest angle between z_i and z_j at the start; assembly can still correct it */
+/* sine of the largest angle between z_i and z_j that is accepted in the description; assembly corrects such an angle */
+constexpr double parallel_sine = 1e-6;
 
 template <class Spec> void CheckBodies(ElementBuilder &e, const Spec &s)
 {

@@ -19,8 +19,8 @@ template <int R> void Enter(JointBuilder &e, std::shared_ptr<const Curve> curve)
 
 } // namespace
 
-/* Forces on i's body along the two normals of the curve; planar: along z x tangent, with the tangent in the direction
- * of the points */
+/* Multipliers: forces on i's body along the two normals of the curve; planar: along z x tangent, with the tangent in the direction
+   of the points */
 template <> Element Scene::enter(const std::string &name, const PointOnCurve &s)
 {
   JointBuilder e(*this, name, "point on curve", s.i, s.j);

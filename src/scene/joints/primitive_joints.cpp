@@ -1,4 +1,4 @@
-/* Single primitive constraints as elements of their own */
+/* Elements that consist of a single primitive constraint. Their comments name the multipliers. */
 #include "joint_builder.h"
 #include "scene/kernels/primitives.h"
 #include "scene/kernels/primitives_axes.h"
@@ -51,7 +51,7 @@ template <> Element Scene::enter(const std::string &name, const Orientation &s)
   return e.done();
 }
 
-/* Tension. Where the markers meet the link has no direction. */
+/* Tension of the link. If the markers coincide, the link has no direction. */
 template <> Element Scene::enter(const std::string &name, const PointDistance &s)
 {
   JointBuilder e(*this, name, "point distance", s.i, s.j);

@@ -1,6 +1,6 @@
 /*
   Rolling without slip and the knife edge: a holonomic row for the contact, velocity-level rows for its tangents. The
-  side of the plane on which the body rolls is that of the start. Multipliers: force of the contact on i's body along the
+  body stays on the side of the plane on which it starts. Multipliers: force of the contact on i's body along the
   axes of j named in rolling.h, first along the normal.
 */
 #include "scene/kernels/rolling.h"
@@ -13,8 +13,8 @@ namespace hhtdae
 namespace
 {
 
-/* radius, and on which side of the plane across axis `normal` of j the centre is at the start; j's side of the axis on
- * the plane itself */
+/* The radius, and the side of the plane normal to axis `normal` of j on which the centre is at the start; the positive side if the centre is
+   in the plane */
 RollingData StartOnPlane(JointBuilder &e, double radius, int normal)
 {
   RollingData data{radius, 1};
@@ -23,12 +23,12 @@ RollingData StartOnPlane(JointBuilder &e, double radius, int normal)
   return data;
 }
 
-/* cosine of the angle between axis a of i and z_j at the start */
+/* Magnitude of the cosine of the angle between axis a of i and z_j at the start */
 double CosineToNormal(const JointBuilder &e, int a) { return std::abs(e.start(0).R.col(a).dot(e.start(1).R.col(2))); }
 
 } // namespace
 
-/* Force along the normal away from the plane; friction along j's x and y axes. In planar scenes the disc is a wheel on
+/* Multipliers: force along the normal away from the plane; friction along j's x and y axes. In planar scenes the disc is a wheel on
    the x axis of j: force along y_j, friction along x_j. */
 template <> Element Scene::enter(const std::string &name, const RollingDisc &s)
 {
@@ -47,7 +47,7 @@ template <> Element Scene::enter(const std::string &name, const RollingDisc &s)
   return e.done();
 }
 
-/* Force along z_j; friction along j's x and y axes. */
+/* Multipliers: force along z_j; friction along j's x and y axes. */
 template <> Element Scene::enter(const std::string &name, const RollingSphere &s)
 {
   JointBuilder e(*this, name, "rolling sphere", s.i, s.j);
@@ -58,7 +58,7 @@ template <> Element Scene::enter(const std::string &name, const RollingSphere &s
   return e.done();
 }
 
-/* Force along z_j; force along y_i. */
+/* Multipliers: force along z_j; force along y_i. */
 template <> Element Scene::enter(const std::string &name, const KnifeEdge &s)
 {
   JointBuilder e(*this, name, "knife edge", s.i, s.j);

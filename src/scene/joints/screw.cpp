@@ -7,7 +7,7 @@
 namespace hhtdae
 {
 
-/* Rows: force on i's body along j's x and y axes, moment about them, axial force. */
+/* Multipliers: force on i's body along j's x and y axes, moment about these axes, axial force. */
 template <> Element Scene::enter(const std::string &name, const Screw &s)
 {
   ElementBuilder e(*this, name, "screw", ElementData::Joint, s.i, s.j);

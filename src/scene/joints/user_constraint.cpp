@@ -11,12 +11,12 @@ namespace hhtdae
 namespace
 {
 
-constexpr int max_markers = 6; /* of a row: those of the largest kernel below */
+constexpr int max_markers = 6; /* largest number of markers of a row, that of the largest kernel below */
 
 bool OfPositions(Measure::Kind k) { return k == Measure::Displacement || k == Measure::Distance || k == Measure::Angle; }
 bool OfInputs(Measure::Kind k) { return k == Measure::Value || k == Measure::StateValue; }
 
-/* Builds one row of the element: checks its measures and numbers their markers, angles and inputs for the kernel */
+/* Builds one row of the element: checks its measures, and assigns the numbers of their markers, angles and inputs in the kernel */
 class RowBuilder
 {
 public:
@@ -69,7 +69,7 @@ private:
     }
   }
 
-  /* A row that depends on rotations of a body puts a moment on it */
+  /* Checks that a moment can act on a body on whose rotation the row depends */
   void mayTurn(const Measure &m, const std::string &what)
   {
     const SceneData &s      = e_.scene();
@@ -120,7 +120,7 @@ private:
     scale();
   }
 
-  /* Length scale of lengths: the distance of the markers; other measures have scale 1 */
+  /* Sets the scales of measures (UserRow::Argument::reach): for lengths the distance of the markers, for others 1 */
   void scale()
   {
     double size = 0;
@@ -172,7 +172,7 @@ private:
 /* One multiplier per row; the load is the multiplier times the derivatives of the row's expression. */
 template <> Element Scene::enter(const std::string &name, const UserConstraint &s)
 {
-  Marker i, j; /* the first marker of a body, and the first of another body */
+  Marker i, j; /* the first marker on a body, and the first marker on another body */
   for (const Expression &f : s.rows)
     for (const Measure &m : f.arguments)
       for (Marker k : {m.i, m.j, m.frame}) {
@@ -181,7 +181,7 @@ template <> Element Scene::enter(const std::string &name, const UserConstraint &
         if (i.id < 0 && body >= 0) i = k;
         else if (i.id >= 0 && j.id < 0 && body != data().markers[i.id].body) j = k;
       }
-  if (i.id < 0) i = data().markers.empty() ? marker(ground()) : Marker{0}; /* its rows will say what they lack */
+  if (i.id < 0) i = data().markers.empty() ? marker(ground()) : Marker{0}; /* any marker: the rows then report that they have none */
   ElementBuilder e(*this, name, "user constraint", ElementData::Joint, i, j, false);
   e.require(!s.rows.empty(), "it has no rows");
   std::vector<RowBuilder> rows;

@@ -1,7 +1,7 @@
 /*
   Primitive constraints on the origins of two markers, i = frame 0 and j = frame 1. Gradient and curvature are written
-  out for speed. Signs: the reaction on the bodies is -J^T lambda, and each row is such that
-  its multiplier is the force on i's body in the named direction; the opposite force acts on j's body at the
+  out for speed. The reaction on the bodies is -J^T lambda; the sign of each row is chosen so that
+  its multiplier is the force on i's body in the direction named below. The opposite force acts on j's body at the
   same point.
 
   d = x_i - x_j; a rotation theta_j of j changes an axis a of j by theta_j x a.
@@ -43,8 +43,7 @@ using Coincide  = CoincideRows<3>;
 using Coincide2 = CoincideRows<2>; /* planar scenes */
 
 /*
-  Gradient and curvature of rows -d . a_r with axes a_r fixed in j. With u = sum of lambda_r a_r the load J^T lambda is (-u, 0, u, d x
-  u).
+  Gradient and curvature of rows -d . a_r with axes a_r fixed in j. With u = sum of lambda_r a_r, J^T lambda = (-u, 0, u, d x u).
 */
 inline void AlongAxesGradient(const Vec3<double> &d, const Vec3<double> &a,
                               Eigen::Ref<Matrix<1, 12>, 0, Eigen::InnerStride<>> J)
@@ -68,8 +67,8 @@ inline void AlongAxesCurvature(const Vec3<double> &d, const Vec3<double> &u, Mat
 
 constexpr bool AlongAxesCurved(int a, int b) { return (a == 3 && b != 1) || (b == 3 && a != 1); }
 
-/* i's origin in a plane of j across its axis A, at height `offset` above j's origin. Multiplier: force on i's body
- * along that axis. */
+/* i's origin in the plane normal to axis A of j, at the distance `offset` from j's origin along that axis. Multiplier: force on i's body
+   along that axis. */
 template <int A> struct OnPlane : Constraint<OnPlane<A>, 2, 1> {
   using Base                           = Constraint<OnPlane<A>, 2, 1>;
   static constexpr const char *name    = "point on plane";
@@ -117,8 +116,8 @@ struct OnLine : Constraint<OnLine, 2, 2> {
 };
 
 /*
-  |d| = L as (|d|^2 - L^2) / (2 L): a polynomial, smooth even where the points meet. Multiplier: tension of the massless
-  link, positive where it pulls i towards j (force on i's body -lambda d / L).
+  |d| = L, written as (|d|^2 - L^2) / (2 L) = 0: a polynomial, which is smooth even where the points coincide. Multiplier: tension of the massless
+  link, positive if it pulls i towards j (force on i's body -lambda d / L).
 */
 struct Distance : Constraint<Distance, 2, 1> {
   static constexpr const char *name           = "distance";

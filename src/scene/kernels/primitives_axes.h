@@ -1,18 +1,18 @@
 /*
-  Primitive constraints on the axes of two markers, i = frame 0 and j = frame 1: rows that are sums of products of an
-  axis of i with an axis of j, c (a . b) = the sine of an angle where they are met. With the product's turn by theta
+  Primitive constraints on the axes of two markers, i = frame 0 and j = frame 1: rows that are sums of products c (a . b) of an
+  axis a of i with an axis b of j, each of which is the sine of an angle that the constraint keeps zero. With the differential of a product
 
     d(a . b) = (theta_i - theta_j) . (a x b)
 
-  and W = sum over the products of lambda c a b^T, gradient and curvature of all such constraints are the same few
-  lines:
+  and W = sum over the products of lambda c a b^T, gradient and curvature of all such constraints are
 
     J^T lambda = (g, -g),  g = sum of lambda c (a x b)
     dg/dtheta_i = W - tr(W) 1,   dg/dtheta_j = -(W^T - tr(W) 1)
 
-  Signs as in primitives.h: multipliers are moments on i's body in the direction that is named, its opposite acts on j's
-  body. Antiparallel axes satisfy an alignment, too, but with the opposite gradient of the products: a joint stays on the branch on which it starts, and
-  its data have the sign of each row there (JointMultipliers.AxesThatPointAwayFromEachOther).
+  Signs as in primitives.h: multipliers are moments on i's body in the direction named below; the opposite moments act on j's
+  body. Antiparallel axes satisfy an alignment as well as parallel ones, but the gradients of the products have the opposite
+  sign. A joint stays on the branch on which it starts, and its data have the sign of each row on that branch
+  (JointMultipliers.AxesThatPointAwayFromEachOther).
 */
 #ifndef HHTDAE_SCENE_PRIMITIVES_AXES_H
 #define HHTDAE_SCENE_PRIMITIVES_AXES_H
@@ -24,17 +24,17 @@ namespace hhtdae
 {
 
 struct AxisProduct {
-  int    row, i, j; /* axis i of marker i with axis j of marker j */
+  int    row, i, j; /* number of the row; the axis of marker i and the axis of marker j */
   double factor;
 };
 
-/* Signs of the rows on the branch of the start */
+/* Signs of the rows on the branch on which the joint starts */
 template <int R> struct AxisBranch {
   double sign[R];
   AxisBranch() { std::fill(sign, sign + R, 1.); }
 };
 
-/* K gives `products`, an array of AxisProduct */
+/* Base of kernels K that define `products`, an array of AxisProduct */
 template <class K, int R> struct AxisProducts : Constraint<K, 2, R> {
   using Base = Constraint<K, 2, R>;
   using typename Base::Gradient;
@@ -77,8 +77,8 @@ template <int A, int B> struct AxesPerpendicular : AxisProducts<AxesPerpendicula
 };
 
 /*
-  z_i parallel to z_j: z_i . y_j = 0, -z_i . x_j = 0. Multipliers: moment on i's body about j's x and y axes. With the
-  axes of j rather than i the rows of a shaft on the ground do not change as it turns.
+  z_i parallel to z_j: z_i . y_j = 0, -z_i . x_j = 0. Multipliers: moment on i's body about j's x and y axes. The rows use x and y
+  of j instead of i, so that those of a shaft in a bearing on the ground do not change as it rotates.
 */
 struct Parallel : AxisProducts<Parallel, 2> {
   static constexpr const char *name       = "parallel axes";
@@ -97,11 +97,12 @@ struct Orient : AxisProducts<Orient, 3> {
   static constexpr const char *name       = "orientation";
   static constexpr AxisProduct products[] = {{0, 2, 1, 1}, {1, 0, 2, 1}, {2, 1, 0, 1}};
 
-  /* The nearest one: z_i, x_i and y_i along those of j, or after half a turn two of them opposite. *misses: cosine of the angle that is missing to it, 1 with
-     none; the products vanish after a third of a turn about (1, 1, 1) as well, where it is -1/2 for all of them. */
+  /* The nearest branch: z_i, x_i and y_i are parallel to those of j, or two of them are antiparallel after half a turn.
+     *least_cosine: cosine of the angle of the rotation that is missing to this branch, 1 if none is. The products are
+     also zero after a third of a turn about (1, 1, 1), where this cosine is -1/2 for all branches. */
   static Data branch(const Frame<double> &i, const Frame<double> &j, double *least_cosine)
   {
-    constexpr double half[4][3] = {{1, 1, 1}, {-1, 1, -1}, {1, -1, -1}, {-1, -1, 1}}; /* of rows */
+    constexpr double half[4][3] = {{1, 1, 1}, {-1, 1, -1}, {1, -1, -1}, {-1, -1, 1}}; /* signs of the rows for each branch */
     const double     same[3]    = {i.R.col(2).dot(j.R.col(2)), i.R.col(0).dot(j.R.col(0)), i.R.col(1).dot(j.R.col(1))};
     double           most       = -1;
     Data             d;
@@ -116,7 +117,7 @@ struct Orient : AxisProducts<Orient, 3> {
   }
 };
 
-/* No turn of i relative to j about z, for planar scenes: y_i . x_j = 0. Multiplier: moment on i's body about z. */
+/* No rotation of i relative to j about z, for planar scenes: y_i . x_j = 0. Multiplier: moment on i's body about z. */
 struct OrientInPlane : AxisProducts<OrientInPlane, 1> {
   static constexpr const char *name       = "orientation in the plane";
   static constexpr AxisProduct products[] = {{0, 1, 0, 1}};

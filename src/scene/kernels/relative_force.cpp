@@ -6,7 +6,7 @@ namespace hhtdae
 namespace
 {
 
-/* Transforms derivatives from the axes E to space, and from relative motion to both markers */
+/* Transforms derivatives L from the axes E to space axes, and from relative motion to the motion of both markers */
 void ToSpace(const Mat3<double> &E, const Matrix<9, 9> &L, Matrix<12, 12> &J)
 {
   for (int col = 0; col < 3; col++) {
@@ -28,9 +28,9 @@ void Spread(const Mat3<double> &E, const Relative<double> &r, const RelativeDeri
   const Vec3<double>  cf(by.c[0], by.c[1], by.c[2]), cm(by.c[3], by.c[4], by.c[5]), cj = cm + r.d.cross(cf);
   const Mat3<double> &S = by.spin, D = Cross<double>(r.d), F = Cross<double>(cf);
 
-  /* columns theta_x, theta_i, theta_j; rows force on i, moment on i, minus the moment on j */
+  /* columns: theta_x, theta_i, theta_j; rows: force on i, moment on i, minus the moment on j */
   Matrix<9, 9> L;
-  Matrix<6, 3> by_axes = by.frame.leftCols<3>() * D; /* by e */
+  Matrix<6, 3> by_axes = by.frame.leftCols<3>() * D; /* derivatives of the components by e, the rotation of the axes E */
   if (twists)
     by_axes += by.motion.leftCols<3>() * Cross<double>(r.v) + by.motion.middleCols<3>(3) * Cross<double>(r.wi) +
                by.motion.rightCols<3>() * Cross<double>(r.wj);
@@ -38,13 +38,13 @@ void Spread(const Mat3<double> &E, const Relative<double> &r, const RelativeDeri
   L.block<6, 3>(0, 0)       = by.frame.leftCols<3>();
   L.block<6, 3>(0, 3)       = turned + by_axes * S;
   L.block<6, 3>(0, 6)       = by_axes - by_axes * S - turned;
-  /* cm + d x cf, of which [cf] acts on dd = theta_x + [d] e */
+  /* Third block of rows: cm + d x cf. The variation dd = theta_x + [d] e of d contributes -[cf] dd */
   L.bottomRows<3>() = L.middleRows<3>(3) + D * L.topRows<3>();
   L.block<3, 3>(6, 0) -= F;
   const Mat3<double> FD = F * D;
   L.block<3, 3>(6, 3) -= FD * S;
   L.block<3, 3>(6, 6) -= FD - FD * S;
-  /* the turning of the axes */
+  /* Rotation of the axes E, with which the components turn */
   Matrix<9, 3> with_axes;
   with_axes << F, Cross<double>(cm), Cross<double>(cj);
   const Matrix<9, 3> carried_i = with_axes * S;

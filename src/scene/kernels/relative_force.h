@@ -1,17 +1,17 @@
 /*
-  Forces between two frames that depend only on their relative position, rotation and motion, in the axes E of a
-  reference frame that moves with both: common part of bushing and beam.
+  Forces between two frames that depend only on their relative position, rotation and motion, expressed in the axes E of a
+  reference frame that moves with both: the common part of bushing and beam.
 
   In the axes E: d = x_i - x_j; phi, the rotation vector of R_j^T R_i; v = v_i - v_j and the angular velocities. The
-  kernel says
+  kernel defines
 
     axes(R_j, q)   the reference axes E, q the quaternion of R_j^T R_i
-    spin(phi)      S:  E turns with  S theta_i + (1 - S) theta_j
+    spin(phi)      S:  E rotates by  S theta_i + (1 - S) theta_j
     turn(phi)      P:  d phi = P (theta_i - theta_j)
     local(...)     the six components: force and moment on i in the axes E, the moment about the origin of i
 
-  The wrench on j is the one that balances these: -f and -m - d x f. The wrench turns with the two frames by
-  construction, so that a rigid motion of both leaves the components as they are.
+  The wrench on j balances these: -f and -m - d x f. A rigid motion of both frames does not change the components, since
+  E moves with the frames.
 */
 #ifndef HHTDAE_SCENE_KERNELS_RELATIVE_FORCE_H
 #define HHTDAE_SCENE_KERNELS_RELATIVE_FORCE_H
@@ -24,14 +24,14 @@ namespace hhtdae
 
 template <class T> struct Relative {
   Vec3<T> d, phi;    /* d = x_i - x_j; phi: rotation vector of R_j^T R_i */
-  Vec3<T> v, wi, wj; /* v_i - v_j, angular velocities; undefined where the kernel is not damped */
+  Vec3<T> v, wi, wj; /* v_i - v_j, angular velocities; not set if the kernel is not damped */
 };
 
 /* Components of a kernel at one state, and the derivatives that the matrix needs */
 struct RelativeDerivatives {
   double       c[6];       /* components */
-  Matrix<6, 6> frame;      /* their derivatives by (d, phi) */
-  Matrix<6, 9> motion;     /* and by (v, w_i, w_j); undefined where the kernel is not damped */
+  Matrix<6, 6> frame;      /* derivatives of the components by (d, phi) */
+  Matrix<6, 9> motion;     /* derivatives of the components by (v, w_i, w_j); not set if the kernel is not damped */
   Mat3<double> spin, turn; /* S, P */
 };
 
@@ -84,13 +84,13 @@ template <class K, bool Damped> struct RelativeForce : Force<K, 2, 6> {
   }
 
   /*
-    The components are differentiated automatically in the few numbers of Relative<>. A variation of the frames changes
-    these by
+    The components are differentiated automatically by the few numbers of Relative<>. A variation of the frames changes
+    these numbers by
 
       d d = theta_x + [d] e,  d phi = P (theta_i - theta_j),  d v = [v] e,  d w = [w] e,    e = S theta_i + (1 - S)
     theta_j
 
-    with theta_x = dx_i - dx_j, all in the axes E; and a vector u carried by E changes by E (du - [u] e).
+    with theta_x = dx_i - dx_j, all in the axes E. A vector with the components u in the axes E changes by E (du - [u] e).
   */
   template <class Data, int Z>
   static void jacobian(const Data &data, const Frame<double> *f, const Twist<double> *w, double, const double *,
@@ -108,7 +108,7 @@ template <class K, bool Damped> struct RelativeForce : Force<K, 2, 6> {
   }
 
 private:
-  /* components and their derivatives in (d, phi) and (v, w_i, w_j) */
+  /* The components and their derivatives by (d, phi) and (v, w_i, w_j) */
   template <class Data>
   static void differentiate(const Data &data, const Relative<double> &r, RelativeDerivatives &by)
   {

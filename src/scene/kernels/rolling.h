@@ -1,13 +1,13 @@
 /*
-  Contact without slip on the body of marker j: one holonomic row keeps the contact, velocity-level rows keep it from
-  slipping. The points of both bodies that touch have the same velocity along the tangents e of the surface,
+  Rolling without slip on the body of marker j: one holonomic row keeps the contact, velocity-level rows exclude
+  slip. The touching points of both bodies have the same velocity along the tangents e of the surface,
 
     -e . (v_i + w_i x arm - v_j - w_j x (d + arm)) = 0,   d = x_i - x_j, arm from x_i to the point of contact,
 
-  and their multipliers are the force of friction on i's body at the point of contact, along j's axes. The multiplier of
-  the holonomic row is the normal force there. As a contact it is two-sided: it also pulls.
+  and the multipliers of these rows are the friction force on i's body at the point of contact, along j's axes. The multiplier of
+  the holonomic row is the normal force. The contact is bilateral: it also pulls.
 
-  n, the normal on i's side of the plane, is +z_j or -z_j: `side`, from the start.
+  n, the normal on i's side of the plane, is side z_j; the start determines side = +1 or -1.
 */
 #ifndef HHTDAE_SCENE_ROLLING_H
 #define HHTDAE_SCENE_ROLLING_H
@@ -24,7 +24,7 @@ struct RollingData {
   double radius = 1, side = 1;
 };
 
-/* Velocity of i's body relative to j's body at the point of contact */
+/* Velocity of i's body relative to j's body at the point of contact, x_i + arm */
 template <class T> Vec3<T> SlipVelocity(const Frame<T> *f, const Twist<T> *w, const Vec3<T> &arm)
 {
   const Vec3<T> lever = f[0].x - f[1].x + arm;
@@ -42,9 +42,10 @@ template <class T> Vec3<T> Upward(double side, const Frame<T> *f)
   return n - z * along;
 }
 
-/* r |q| - n . d = 0, q = n - (n . z_i) z_i: the lowest point x_i - r q/|q| is in the plane. Multiplier: force on i's body along n, at the lowest point.
-   A disc that lies flat has no lowest point: a step at most halves the angle between disc and plane, and below flat_angle the row is NaN, so that the run ends with an
-   error that names the joint (JointRuns.ADiscThatFallsFlat). */
+/* r |q| - n . d = 0, q = n - (n . z_i) z_i: the lowest point x_i - r q/|q| is in the plane. Multiplier: force on i's body
+   along n, at the lowest point. A disc that lies flat has no lowest point. longestStep() ensures that a step at most
+   halves the angle between disc and plane; below flat_angle the row is NaN, so that the run ends with an error that names
+   the joint (JointRuns.ADiscThatFallsFlat). */
 struct DiscOnPlane : Constraint<DiscOnPlane, 2, 1> {
   static constexpr const char *name = "disc on plane";
   static constexpr double      flat_angle = 1e-2; /* rad, between the disc and the plane */
@@ -58,10 +59,12 @@ struct DiscOnPlane : Constraint<DiscOnPlane, 2, 1> {
     const T       length = sqrt(q.squaredNorm());
     phi[0]               = length * T(data.radius) - d.dot(f[1].R.col(2)) * T(data.side);
     if constexpr (std::is_same_v<T, double>)
-      if (length < flat_angle) phi[0] = std::numeric_limits<double>::quiet_NaN(); /* only in the residual: its error message names this row, that of a NaN in the matrix all coupled rows */
+      /* only in the residual, where the error message names this row; for a NaN in the matrix it would name all coupled
+         rows */
+      if (length < flat_angle) phi[0] = std::numeric_limits<double>::quiet_NaN();
   }
 
-  /* Time until the angle between disc and plane is halved */
+  /* Time, s, in which the angle between disc and plane is halved */
   static double longestStep(const Data &data, const Frame<double> *f, const Twist<double> *w, double, double angular)
   {
     const Vec3<double> n = f[1].R.col(2) * data.side, z = f[0].R.col(2), turn = w[0].w - w[1].w;
@@ -73,7 +76,7 @@ struct DiscOnPlane : Constraint<DiscOnPlane, 2, 1> {
   }
 };
 
-/* The lowest point of the disc. Multipliers: friction on i's body along j's x and y axes. */
+/* The lowest point of the disc does not slip. Multipliers: friction on i's body along j's x and y axes. */
 struct DiscNoSlip : VelocityConstraint<DiscNoSlip, 2, 2> {
   static constexpr const char *name = "disc without slip";
   using Data                        = RollingData;
@@ -96,8 +99,8 @@ struct DiscNoSlip : VelocityConstraint<DiscNoSlip, 2, 2> {
 /* ---- sphere about x_i, or a wheel in a planar scene: the point of contact is x_i - r n with n along axis N of j ----
  */
 
-/* R = 2: both tangents, in the order of the axes; R = 1: the first. Multipliers: friction on i's body along these axes
-   of j. The holonomic row is OnPlane<N> with offset side * radius (primitives.h), its multiplier the force on i's body
+/* R = 2: rows for both tangents, in the order of the axes; R = 1: a row for the first. Multipliers: friction on i's body along these axes
+   of j. The holonomic row is OnPlane<N> with offset side * radius (primitives.h); its multiplier is the force on i's body
    along axis N of j. */
 template <int N, int R> struct SphereNoSlip : VelocityConstraint<SphereNoSlip<N, R>, 2, R> {
   static constexpr const char *name = "sphere without slip";

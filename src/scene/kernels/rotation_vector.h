@@ -1,9 +1,8 @@
 /*
-  The rotation vector phi of a rotation matrix, R = exp([phi]), by way of its unit quaternion; exact for angles up to
-  pi, smooth at zero. Derivatives are right along rotations of R, R -> (1 + [theta]) R, which is all that is asked of
-  them.
+  The rotation vector phi of a rotation matrix R = exp([phi]), computed from its unit quaternion; exact for angles up to
+  pi, smooth at zero. Derivatives are correct for rotations of R, R -> (1 + [theta]) R; kernels use no other variations.
 
-  The functions below of s = |phi|^2 that go with it are even in the angle; near zero they are summed as series.
+  The functions of s = |phi|^2 below are even functions of the angle, computed by series near zero.
 */
 #ifndef HHTDAE_SCENE_KERNELS_ROTATION_VECTOR_H
 #define HHTDAE_SCENE_KERNELS_ROTATION_VECTOR_H
@@ -19,7 +18,7 @@ template <class T> struct Quaternion {
   Vec3<T> v;
 };
 
-/* The unit quaternion of R with w >= 0: of the four formulas the one with the largest divisor (Shepperd 1978) */
+/* The unit quaternion of R with w >= 0, by the one of four formulas that has the largest divisor (Shepperd 1978) */
 template <class T> Quaternion<T> UnitQuaternion(const Mat3<T> &R)
 {
   using std::sqrt;
@@ -59,7 +58,7 @@ template <class T> Mat3<T> RotationMatrix(const Quaternion<T> &q)
   return R;
 }
 
-/* Half of the rotation; w >= 0 keeps it away from the singularity at a full turn */
+/* The quaternion of half the rotation; since w >= 0 the angle is at most half a turn, far from the singularity at a full turn */
 template <class T> Quaternion<T> HalfTurn(const Quaternion<T> &q)
 {
   using std::sqrt;
@@ -76,7 +75,7 @@ template <class T> Vec3<T> RotationVector(const Quaternion<T> &q)
   using std::sqrt;
   const T v2 = q.v.dot(q.v);
   T       factor;
-  if (Plain(v2) < 1e-3 * Plain(q.w) * Plain(q.w)) { /* 2 atan(x)/x of x = |v|/w */
+  if (Plain(v2) < 1e-3 * Plain(q.w) * Plain(q.w)) { /* series of 2 atan(x)/x for x = |v|/w */
     const T y = v2 / (q.w * q.w);
     factor    = (T(1) - y * (T(1. / 3) - y * (T(1. / 5) - y * (T(1. / 7) - y * T(1. / 9))))) * T(2) / q.w;
   } else {
@@ -86,7 +85,7 @@ template <class T> Vec3<T> RotationVector(const Quaternion<T> &q)
   return q.v * factor;
 }
 
-/* (1 - a/2 cot(a/2)) / a^2, s = a^2: of the inverse differential of the exponential map,
+/* (1 - a/2 cot(a/2)) / a^2 for s = a^2, a coefficient of the inverse differential of the exponential map,
    d phi = (1 - [phi]/2 + HalfCot [phi]^2) d theta for exp([phi]) -> (1 + [d theta]) exp([phi]) */
 template <class T> T HalfCot(const T &s)
 {
@@ -99,7 +98,7 @@ template <class T> T HalfCot(const T &s)
   return (T(1) - half * cos(half) / sin(half)) / s;
 }
 
-/* (a / sin a - 1) / a^2 */
+/* (a / sin a - 1) / a^2 for s = a^2 */
 template <class T> T Cosecant(const T &s)
 {
   using std::sin;
@@ -110,7 +109,7 @@ template <class T> T Cosecant(const T &s)
   return (a / sin(a) - T(1)) / s;
 }
 
-/* tan(a/2) / a */
+/* tan(a/2) / a for s = a^2 */
 template <class T> T HalfTan(const T &s)
 {
   using std::cos;

@@ -1,10 +1,10 @@
 /*
-  Springs and dampers along the line between the origins of two markers. The component is the tension, positive when it
-  pulls the two together; with d = x_i - x_j, l = |d|, n = d/l and l' = n . (v_i - v_j) the force on i is -tension n.
+  Springs and dampers along the line between the origins of two markers. The component is the tension, positive if it
+  pulls the markers together. With d = x_i - x_j, l = |d|, n = d/l and l' = n . (v_i - v_j), the force on i is -tension n.
 
-  Where the origins coincide, n is taken as zero: the line has no direction, and a tension without one makes no force.
-  For a spring of free length zero and no preload this is the exact limit, f = -k d, with the exact derivative -k. A
-  damper there resists as along the path through the point, f = -c (v_i - v_j).
+  Where the origins coincide, the line has no direction: n is set to zero, so that the tension causes no force.
+  For a spring with free length zero and no preload this is the exact limit f = -k d, with the exact derivative -k. The
+  force of a damper is then f = -c (v_i - v_j), as for a motion along the line.
 */
 #ifndef HHTDAE_SCENE_KERNELS_SPRING_H
 #define HHTDAE_SCENE_KERNELS_SPRING_H
@@ -53,7 +53,7 @@ template <class K> struct LineForce : Force<K, 2, 1> {
     pull<T>(line.along * c[0], on);
   }
 
-  /* F on j, -F on i */
+  /* The wrenches of a force F on j and -F on i */
   template <class T> static void pull(const Vec3<T> &F, Wrench<T> *on)
   {
     on[0].f = -F;
@@ -61,7 +61,7 @@ template <class K> struct LineForce : Force<K, 2, 1> {
     on[0].m = on[1].m = Vec3<T>(T(0), T(0), T(0));
   }
 
-  /* the blocks of forces that depend on x_i - x_j; B = d(-f_i)/d(x_i - x_j) */
+  /* J: blocks of the derivatives of forces that depend on x_i - x_j; B = d(-f_i)/d(x_i - x_j) */
   static void spread(const Mat3<double> &B, Matrix<12, 12> &J)
   {
     J.setZero();
@@ -70,8 +70,8 @@ template <class K> struct LineForce : Force<K, 2, 1> {
   }
 };
 
-/* tension = k (l - length) + c l' + preload, in N; a spring without damping is a kernel of its own, symmetric and
- * without velocities */
+/* tension = k (l - length) + c l' + preload, in N. A spring without damping is a separate kernel, whose matrix is
+   symmetric and without derivatives by velocities */
 template <bool Damped> struct LinearSpring : LineForce<LinearSpring<Damped>> {
   static constexpr const char *name   = Damped ? "spring-damper" : "spring";
   static constexpr bool        damped = Damped;
@@ -87,7 +87,7 @@ template <bool Damped> struct LinearSpring : LineForce<LinearSpring<Damped>> {
     if constexpr (Damped) c[0] += T(p.damping) * line.rate(w);
   }
 
-  /* of spring and preload */
+  /* Potential energy of spring and preload */
   static double energy(const Data &p, const Frame<double> *f)
   {
     const double l = Line<double>(f).length, stretch = l - p.length;
@@ -105,8 +105,8 @@ template <bool Damped> struct LinearSpring : LineForce<LinearSpring<Damped>> {
     LinearSpring::template pull<double>(tension * line.along, on);
   }
 
-  /* d(tension n) = (k n + c dl') n + tension/l (1 - n n^T),  dl' = (v - l' n)/l; tension/l is k plus what vanishes for
-   * free length zero */
+  /* d(tension n) = n (k n + c dl')^T + tension/l (1 - n n^T),  dl' = (v - l' n)/l. tension/l is k plus terms that are zero for a spring with
+     free length zero */
   template <int Z>
   static void jacobian(const Data &p, const Frame<double> *f, const Twist<double> *w, double t, const double *z,
                        Wrench<double> *on, ForceJacobian<2, Z> &J)
@@ -135,7 +135,7 @@ template <bool Damped> struct LinearSpring : LineForce<LinearSpring<Damped>> {
   }
 };
 
-/* f(a, b) to first order from its value and two derivatives at the plain numbers: exact for double and Dual */
+/* f(a, b) for dual numbers a, b, from the value and the two derivatives of f at their plain values; exact for double and Dual */
 template <class T> T Evaluate(const ForceLaw &f, const T &a, const T &b)
 {
   const Real y = f(Real(Plain(a), 2, 0), Real(Plain(b), 2, 1));
@@ -144,7 +144,7 @@ template <class T> T Evaluate(const ForceLaw &f, const T &a, const T &b)
   else return chain(a, y.derivatives()(0), b, y.derivatives()(1), y.value());
 }
 
-/* tension f(l, l') */
+/* tension = f(l, l') */
 struct CurveSpring : LineForce<CurveSpring> {
   static constexpr const char *name = "nonlinear spring";
   struct Data {

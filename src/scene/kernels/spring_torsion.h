@@ -1,8 +1,8 @@
 /*
   Torsional springs and dampers about z_j. The component M is a moment on i, a function of the angle of i's x axis about
-  z_j, counted over full turns, and of its rate. The wrench is the one that does the work M d angle: the moment M g on i
-  and -M g on j with the angle's gradient g (angle.h). It is z_j if a joint keeps the z axes parallel; otherwise it
-  keeps an elastic moment conservative.
+  z_j, with full turns, and of its rate. The wrench follows from the work M d angle: the moment M g on i
+  and -M g on j, with the gradient g of the angle (angle.h). If a joint keeps the z axes parallel, g = z_j; otherwise
+  g makes an elastic moment conservative.
 */
 #ifndef HHTDAE_SCENE_KERNELS_SPRING_TORSION_H
 #define HHTDAE_SCENE_KERNELS_SPRING_TORSION_H
@@ -36,8 +36,8 @@ template <class K> struct TurnForce : Force<K, 2, 1> {
     return LongestTurn(AngleRate<double>(f[0], f[1], w[0], w[1]), angular);
   }
 
-  /* of M from its value and derivatives in angle and rate: d(M g) = dM g + M dg, d angle = g . (d theta_i - d theta_j),
-     d rate = w . dg + g . dw */
+  /* Derivatives of the wrenches from the value of M and its derivatives by angle and rate: d(M g) = dM g + M dg, d angle
+     = g . (d theta_i - d theta_j), d rate = w . dg + g . dw */
   static void spread(double M, double by_angle, double by_rate, const Frame<double> *f, const Twist<double> *w,
                      Matrix<12, 12> &frames, Matrix<12, 12> &twists)
   {
@@ -79,7 +79,7 @@ template <bool Damped> struct LinearTorsion : TurnForce<LinearTorsion<Damped>> {
     if constexpr (Damped) c[0] -= T(p.damping) * AngleRate<T>(f[0], f[1], w[0], w[1]);
   }
 
-  /* of spring and preload */
+  /* Potential energy of spring and preload */
   static double energy(const Data &p, const Frame<double> *f)
   {
     const double angle = UnwoundAngle<double>(f[0], f[1], p.memory[0]), turn = angle - p.angle;

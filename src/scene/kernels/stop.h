@@ -1,7 +1,7 @@
 /*
-  Stops of an angle, an advance or a distance s: beyond its limits the force of contact_law.h with penetration lower - s or
-  s - upper, without friction. The component is the moment or force along increasing s, for a distance the tension; it is zero within the limits, where
-  only s is evaluated, in plain numbers.
+  Stops of an angle, an advance or a distance s. Beyond the limits of s the force is that of contact_law.h, without friction,
+  with the penetration lower - s or s - upper. The component is the moment or force in the direction of increasing s, for a
+  distance the tension. Within the limits it is zero, and only s is evaluated, with plain numbers.
 */
 #ifndef HHTDAE_SCENE_KERNELS_STOP_H
 #define HHTDAE_SCENE_KERNELS_STOP_H
@@ -13,7 +13,7 @@ namespace hhtdae
 {
 
 struct StopData {
-  double         memory[1]; /* of an angle */
+  double         memory[1]; /* the angle at the last accepted step; unused for an advance or a distance */
   double         lower, upper;
   ContactLaw     law;
   int            axis;
@@ -22,7 +22,7 @@ struct StopData {
   double depth(double s) const { return s < lower ? lower - s : s - upper; }
 };
 
-/* force along increasing s */
+/* Force or moment in the direction of increasing s */
 template <class T> T StopForce(const StopData &d, const T &s, const T &rate)
 {
   if (d.free(Plain(s))) return T(0);
@@ -35,7 +35,7 @@ template <class T> T StopForce(const StopData &d, const T &s, const T &rate)
 
 inline double StopEnergy(const StopData &d, double s) { return d.free(s) ? 0 : ElasticEnergy(d.law, d.depth(s)); }
 
-/* value of the force, and derivatives by s and its rate */
+/* The force, with derivatives by s and its rate */
 inline Dual<2> StopDerivatives(const StopData &d, double s, double rate) { return StopForce<Dual<2>>(d, Dual<2>(s, 0), Dual<2>(rate, 1)); }
 
 template <int Z> void NoForce(Wrench<double> *on, ForceJacobian<2, Z> &J)
@@ -68,7 +68,7 @@ struct TurnStop : TurnForce<TurnStop> {
   }
 };
 
-/* The reaction acts on j's body at i's origin. */
+/* Stop of an advance. The reaction acts on j's body at i's origin. */
 struct AdvanceStop : Force<AdvanceStop, 2, 1> {
   static constexpr const char *name    = "translational stop";
   using Base                           = Force<AdvanceStop, 2, 1>;
@@ -108,7 +108,7 @@ struct LengthStop : LineForce<LengthStop> {
   }
   static double energy(const Data &d, const Frame<double> *f) { return StopEnergy(d, Line<double>(f).length); }
 
-  /* A least distance acts like two balls, which must not pass through each other (Stops.NothingFliesThroughALeastDistance). */
+  /* A lower limit of a distance acts like two balls, which must not pass through each other in a step (Stops.NothingFliesThroughALeastDistance). */
   static double longestStep(const Data &d, const Frame<double> *f, const Twist<double> *w, double acceleration, double)
   {
     const Line<double> line(f);

@@ -6,7 +6,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr int N = 18; /* directions of the three markers of a measure */
+constexpr int N = 18; /* number of directions of the three markers of a measure */
 
 using Argument = UserRow::Argument;
 
@@ -19,7 +19,7 @@ template <class T> T Formula(const Argument &a, const UserRow::At &at, const Mar
   return MarkerMeasure<T>(a.kind, a.component, Remembered(a, at), x[0], a.marker[1] < 0 ? nullptr : &x[1], a.marker[2] < 0 ? nullptr : &x[2]);
 }
 
-/* Motions of a measure's markers, from seed(number of the marker in the row, number in the measure) */
+/* x: motions of a measure's markers, computed by seed(number of the marker in the row, number in the measure) */
 template <class T, class Seeds> void Markers(const Argument &a, const Seeds &seed, MarkerMotion<T> *x)
 {
   for (int i = 0; i < 3; i++) {
@@ -28,7 +28,7 @@ template <class T, class Seeds> void Markers(const Argument &a, const Seeds &see
   }
 }
 
-/* Derivatives of a measure by the frames of its markers, twists constant */
+/* A measure with derivatives by the frames of its markers; the twists are constant */
 Dual<N> ByFrames(const Argument &a, const UserRow::At &at)
 {
   MarkerMotion<Dual<N>> x[3];
@@ -39,7 +39,7 @@ Dual<N> ByFrames(const Argument &a, const UserRow::At &at)
   return Formula(a, at, x);
 }
 
-/* Derivatives of a measure by the twists of its markers */
+/* A measure with derivatives by the twists of its markers */
 Dual<N> ByTwists(const Argument &a, const UserRow::At &at)
 {
   MarkerMotion<Dual<N>> x[3];
@@ -50,7 +50,8 @@ Dual<N> ByTwists(const Argument &a, const UserRow::At &at)
   return Formula(a, at, x);
 }
 
-/* Second derivatives of a measure by the frames; for velocities by twists (outer directions) and frames */
+/* A measure with second derivatives by the frames of its markers; measures of velocities have derivatives by twists
+   (outer directions) and frames (inner) */
 Dual2<N> Twice(const Argument &a, const UserRow::At &at)
 {
   MarkerMotion<Dual2<N>> x[3];
@@ -71,7 +72,7 @@ Dual2<N> Twice(const Argument &a, const UserRow::At &at)
   return Formula(a, at, x);
 }
 
-/* Direction of the row's markers that is direction d of a measure's markers; -1: none */
+/* The direction of the row's markers to which direction d of a measure's markers corresponds; -1 if the measure does not have this marker */
 int Direction(const Argument &a, int d) { return a.marker[d / 6] < 0 ? -1 : 6 * a.marker[d / 6] + d % 6; }
 
 void Scatter(const Argument &a, double factor, const Dual<N> &x, double *row)
@@ -123,7 +124,7 @@ void UserRow::gradient(const At &at, double *frames, double *twists, double *inp
   }
 }
 
-/* sum_k f_k m_k'' + sum_kl f_kl m_k' m_l' */
+/* Second derivatives by the chain rule: sum_k f_k m_k'' + sum_kl f_kl m_k' m_l', primes for derivatives by the frames or twists */
 void UserRow::curvature(const At &at, double factor, Eigen::Ref<Eigen::MatrixXd> H) const
 {
   const int       n = f.arguments();
@@ -178,7 +179,8 @@ bool UserRow::linear(const At &at) const
     f.gradient(m, g[trial]);
   }
   for (std::size_t k = 0; k < arguments.size(); k++)
-    if (ofVelocities(arguments[k].kind) && !(std::abs(g[1][k] - g[0][k]) <= 1e-9 * std::max(std::abs(g[0][k]), std::abs(g[1][k])))) return false; /* NaN is not linear */
+    /* the negated comparison also rejects NaN */
+    if (ofVelocities(arguments[k].kind) && !(std::abs(g[1][k] - g[0][k]) <= 1e-9 * std::max(std::abs(g[0][k]), std::abs(g[1][k])))) return false;
   return true;
 }
 

@@ -1,9 +1,9 @@
 /*
-  Rows that a user gives as expressions of measures of markers: -f(m) = 0, so that the load of the multiplier is lambda df/dq.
+  Users' constraints, expressions f of measures m of markers: the row is -f(m) = 0, so that the load of the multiplier is lambda df/dq.
 
-  UserRow is the common part of the kernels, for any number of markers: first derivatives of f by its automatic differentiation, those of
-  the measures by dual numbers for their up to three markers; second derivatives of f, which only the Newton matrix needs, by differences of its
-  gradient (user_function.h).
+  UserRow is the common part of the kernels, for any number of markers. First derivatives of f and of the measures, which have
+  up to three markers, are computed by automatic differentiation; second derivatives of f, which only the Newton matrix needs,
+  by differences of its gradient (user_function.h).
 */
 #ifndef HHTDAE_SCENE_KERNELS_USER_CONSTRAINT_H
 #define HHTDAE_SCENE_KERNELS_USER_CONSTRAINT_H
@@ -22,14 +22,14 @@ namespace hhtdae
 class UserRow
 {
 public:
-  static constexpr int angles = 4, inputs = 2; /* at most */
+  static constexpr int angles = 4, inputs = 2; /* largest numbers of angles and inputs of a row */
 
   struct Argument {
     Measure::Kind kind      = Measure::Time;
     int           component = 0;
-    int           marker[3] = {-1, -1, -1}; /* i, j, frame, among the markers of the row */
-    int           number    = -1;           /* of an angle, among those in the memory; of a variable or state, among the inputs */
-    double        reach     = 0;            /* length scale of the differences for second derivatives */
+    int           marker[3] = {-1, -1, -1}; /* numbers of i, j, frame among the markers of the row */
+    int           number    = -1;           /* number of an angle in the memory, or of a variable or state among the inputs */
+    double        reach     = 0;            /* scale of the measure; the step of the differences for second derivatives is relative to it */
   };
   struct At {
     const Frame<double> *f;
@@ -42,16 +42,16 @@ public:
   std::vector<Argument> arguments;
 
   double value(const At &at) const;
-  /* adds df by (x, theta) of the markers, by their twists, and by the inputs; the latter two may be null */
+  /* Adds the derivatives of f by (x, theta) of the markers, by their twists, and by the inputs; `twists` and `inputs` may be null */
   void gradient(const At &at, double *frames, double *twists, double *inputs) const;
-  /* adds factor times the second derivatives by the frames, or by twists (rows) and frames */
+  /* Adds factor times the second derivatives of f by the frames; at velocity level by twists (rows) and frames (columns) */
   void curvature(const At &at, double factor, Eigen::Ref<Eigen::MatrixXd> H) const;
-  /* the partial derivative by time */
+  /* The partial derivative of f by time */
   double rate(const At &at) const;
-  /* whether f is linear in velocities, with factors that do not depend on inputs, at the positions and time of `at` */
+  /* Whether f, at the positions and time of `at`, is linear in velocities, with factors that do not depend on inputs */
   bool linear(const At &at) const;
 
-  std::array<int, 2> markersOfAngle(int k) const; /* -1: it has no k-th one */
+  std::array<int, 2> markersOfAngle(int k) const; /* {-1, -1} if the row has no k-th angle */
   void   accept(const Frame<double> *f, double *remembered) const;
   double longestStep(const Frame<double> *f, const Twist<double> *w, double angular) const;
 
@@ -66,7 +66,7 @@ struct UserRowData {
   std::shared_ptr<const UserRow> row;
 };
 
-/* Angles: 0, or UserRow::angles. Rows without angles have no memory, so that a continued run can add and remove them
+/* Angles: 0 for rows without angles, else UserRow::angles. Rows without angles have no memory, so that a continued run can add and remove them
    (Continue.AUserConstraintTakesHold). */
 template <int M, int Angles> struct UserPosition : Constraint<UserPosition<M, Angles>, M, 1> {
   using Base                             = Constraint<UserPosition<M, Angles>, M, 1>;

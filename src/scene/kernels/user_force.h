@@ -1,5 +1,5 @@
 /*
-  Loads of user's forces from their components, which are inputs: expressions that the assembly evaluates, or force
+  Loads of users' forces, computed from their components. The components are inputs: values of expressions that the assembly evaluates, or force
   states.
 */
 #ifndef HHTDAE_SCENE_USER_FORCE_H
@@ -11,9 +11,9 @@ namespace hhtdae
 {
 
 /* Force at i's origin and moment on i's body, in the axes of the third marker or of space; the reaction acts on j's
-   body at the same point. Markers that are not used can be any. */
+   body at the same point. Unused markers may be any valid ones. */
 struct UserWrenchData {
-  int  force = -1, moment = -1; /* first component of each; -1: none */
+  int  force = -1, moment = -1; /* number of the first component of the force and of the moment; -1 if there is none */
   bool reaction = false, framed = false;
 };
 template <int C> struct UserWrench : Force<UserWrench<C>, 3, C> {
@@ -54,7 +54,7 @@ private:
   }
 };
 
-/* Along the line from j to i, repulsive if positive; zero if the points coincide and the line has no direction */
+/* A force along the line from j to i, repulsive if positive; zero if the points coincide, since the line then has no direction */
 struct UserAlongLine : Force<UserAlongLine, 2, 1> {
   static constexpr const char *name   = "user scalar force";
   static constexpr int         inputs = 1;
@@ -78,7 +78,7 @@ struct UserAlongLine : Force<UserAlongLine, 2, 1> {
   }
 };
 
-/* A moment on i's body about z_j, the opposite one on j's */
+/* A moment on i's body about z_j, and the opposite moment on j's body */
 struct UserAboutAxis : Force<UserAboutAxis, 2, 1> {
   static constexpr const char *name    = "user scalar moment";
   static constexpr int         inputs  = 1;

@@ -21,7 +21,7 @@ void CheckFunction(ElementBuilder &e, const TimeFunction &f, MotionOf of, double
     e.require(std::isfinite(v.f1) && std::isfinite(v.f2), "its function has derivatives " + Show(v.f1) + " and " + Show(v.f2) + when + ", a displacement needs them finite");
 }
 
-/* f as the rate of a state */
+/* The expression f(t), the rate of a state */
 Expression Rate(const TimeFunction &f)
 {
   return {{Measure::time()}, [f](const Real *m) {
@@ -30,14 +30,16 @@ Expression Rate(const TimeFunction &f)
           }};
 }
 
-/* speed: of the joint at the start, from where a given acceleration is integrated */
+/* Adds the constraint of a motion. speed: relative speed at the start, the initial value from which a prescribed acceleration is integrated */
 template <class Displacement, class Velocity, class OfState, class Spec>
 void Drive(Scene &scene, ElementBuilder &e, const std::string &name, const Spec &s, const MotionData &d, double speed)
 {
   if (s.of == MotionOf::Displacement) e.constrain<Displacement>({s.i, s.j}, d);
   if (s.of == MotionOf::Velocity) e.constrain<Velocity>({s.i, s.j}, d);
   if (s.of == MotionOf::Acceleration) {
-    std::vector<ExpressionData> &states = DataOf(scene).states; /* not by Scene::state(), which would record the call: the state would be added twice when the scene is described anew */
+    /* Scene::state() is not used, since it would record the call, and the state would be added twice when the scene is
+       described anew */
+    std::vector<ExpressionData> &states = DataOf(scene).states;
     const PetscInt               w      = (PetscInt)states.size();
     states.push_back({name.empty() ? "state " + std::to_string(w) : name + " speed", Rate(s.function), speed});
     e.constrain<OfState>({s.i, s.j}, d, {ScalarRef{ScalarRef::State, w, 0}});
