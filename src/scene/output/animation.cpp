@@ -1,6 +1,7 @@
 /*
-  -scene_animation: what ParaView opens is prefix.pvd, an index of times and files of VTK's XML PolyData, one per frame. Poses of
-  the bodies are gathered on the first rank, which moves the mesh and writes. Cell data: id and speed of the body.
+  -scene_animation PREFIX: ParaView opens PREFIX.pvd, an index of times and files of VTK's XML PolyData, one file per frame.
+  The first rank gathers the poses of the bodies, moves the mesh and writes the files. Cell data: number and speed of the
+  body.
 */
 #include "scene/output/mesh.h"
 #include "scene/output/recorder.h"
@@ -14,7 +15,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr int animated_pose = 13; /* numbers per body: r, A by columns, |v| */
+constexpr int animated_pose = 13; /* number of values per body: r, A by columns, |v| */
 
 class Animation : public Task
 {
@@ -60,7 +61,7 @@ public:
     return 0;
   }
 
-  /* Later frames are overwritten, their entries in the index removed */
+  /* Frames after the checkpoint are overwritten, and their entries in the index removed */
   PetscErrorCode resume(Runtime &R, const double *x) override
   {
     bool there = false;
@@ -79,9 +80,9 @@ private:
   std::vector<std::vector<PetscInt>> own_; /* bodies of every rank */
   Mesh                               mesh_;
   PetscInt                           frame_ = 0;
-  long                               end_   = 0; /* of the entries in the index */
+  long                               end_   = 0; /* position in the index file, in bytes, after its last entry */
 
-  /* Poses by body, on the first rank */
+  /* pose: poses of all bodies, on the first rank */
   PetscErrorCode gather(const Runtime &R, std::vector<double> &pose)
   {
     std::vector<double> mine, all;
@@ -126,7 +127,7 @@ private:
       PolyData::Cells &out = c == &mesh_.lines ? d.lines : d.polygons;
       out.point.assign(c->point.begin(), c->point.end());
       out.end.assign(c->end.begin(), c->end.end());
-      for (PetscInt b : c->body) { /* lines before polygons, as VTK counts its cells */
+      for (PetscInt b : c->body) { /* lines come before polygons, since VTK numbers cells in this order */
         d.body.push_back((int)b);
         d.speed.push_back(b < 0 ? 0.f : (float)pose[animated_pose * b + animated_pose - 1]);
       }
@@ -134,7 +135,7 @@ private:
     return d;
   }
 
-  /* The index is whole after every frame: a new entry goes where the closing tags were. */
+  /* Writes the closing tags of the index, so that it is complete after every frame; the next entry overwrites them. */
   PetscErrorCode closeIndex()
   {
     long end = 0;

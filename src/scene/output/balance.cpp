@@ -1,7 +1,7 @@
 /*
-  -scene_balance: energy and momentum after every step, as a check of the run. The total is constant where nothing but springs,
-  bushings, beams and gravity does work: dampers, friction, contact, motions and users' forces change it, and so does the numerical
-  damping of the integrator.
+  -scene_balance: energy and momentum after every step, as a check of the run. The total energy is constant if only springs,
+  bushings, beams and gravity do work. Dampers, friction, contact, motions, users' forces and the numerical
+  damping of the integrator change it.
 */
 #include "scene/output/energy.h"
 #include "scene/output/recorder.h"
@@ -97,12 +97,13 @@ public:
   }
 
 private:
-  static constexpr std::size_t max_buffered_bytes = 1 << 16; /* lines are written when they have this many bytes */
+  static constexpr std::size_t max_buffered_bytes = 1 << 16; /* buffered lines are written when they have this many bytes */
 
-  bool        writes_ = false, begun_ = false, have_first_ = false; /* begun: the head line is written */
-  std::string file_, text_;                                         /* no name: printed; lines that are not yet in the file */
-  bool        there_ = false;                                       /* the file is begun */
-  long        end_   = 0;                                           /* its bytes */
+  bool        writes_ = false, begun_ = false, have_first_ = false; /* begun_: the head line has been written */
+  /* file_: empty if the balance is printed; text_: lines that are not yet in the file */
+  std::string file_, text_;
+  bool        there_ = false;                                       /* whether the file exists */
+  long        end_   = 0;                                           /* its length in bytes */
   Balance     first_;
   double      worst_ = 0, largest_kinetic_ = 0, linear_ = 0, angular_ = 0;
 
@@ -116,7 +117,8 @@ private:
     }
     text_ += text;
     text_ += '\n';
-    if (text_.size() >= max_buffered_bytes || !there_) PetscCall(flush()); /* the first line at once, so that a file that cannot be written is reported at the start */
+    /* the first line is written at once, so that a file that cannot be written is reported at the start */
+    if (text_.size() >= max_buffered_bytes || !there_) PetscCall(flush());
     PetscFunctionReturn(0);
   }
 

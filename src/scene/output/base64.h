@@ -1,4 +1,4 @@
-/* Bytes as text, RFC 4648: in VTK's XML files and in pages. */
+/* Base64 encoding of bytes, RFC 4648, for VTK's XML files and pages. */
 #ifndef HHTDAE_SCENE_OUTPUT_BASE64_H
 #define HHTDAE_SCENE_OUTPUT_BASE64_H
 

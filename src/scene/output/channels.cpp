@@ -9,14 +9,14 @@ namespace hhtdae
 struct ChannelWork {
   std::vector<PetscMPIInt>        owner;
   std::vector<LocalMeasure>       own;   /* arguments of own channels, one after the other */
-  std::vector<std::size_t> what; /* own channels */
-  bool                            energies = false; /* any rank reads one */
+  std::vector<std::size_t> what; /* numbers of own channels */
+  bool                            energies = false; /* whether a channel of any rank reads an energy of the scene */
 };
 
 namespace
 {
 
-/* Updates the memories of channels, as angles over full turns, in accepted steps and checkpoints; adds nothing to the
+/* Updates the memories of channels, which are angles over full turns, in accepted steps and stores them in checkpoints; adds nothing to the
    equations. */
 class ChannelBatch : public ReadingBatch<Batch>
 {

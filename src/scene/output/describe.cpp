@@ -1,10 +1,10 @@
-/* Description of output: channels, shapes and lines of the scene. */
+/* Adds output to the description of a scene: channels, shapes and lines. */
 #include "scene/measures.h"
 
 namespace hhtdae
 {
 
-/* whether a channel's name has another one for a group */
+/* Whether `name` is in the HDF5 group `group`, which would have the same name as a channel */
 static bool Within(const std::string &group, const std::string &name) { return name.size() > group.size() && name.compare(0, group.size(), group) == 0 && name[group.size()] == '/'; }
 
 Channel Scene::channel(const std::string &given, const Expression &value, const std::string &unit)

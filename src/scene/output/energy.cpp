@@ -39,7 +39,7 @@ PetscErrorCode MakeBalance(const Runtime &R, const Evaluation &e, Balance &b)
 {
   PetscFunctionBegin;
   b = Balance();
-  e.bodies.gravity = R.scene.gravity; /* the ground's acceleration has no potential */
+  e.bodies.gravity = R.scene.gravity; /* without the ground's acceleration, which has no potential */
   for (PetscInt i = 0; i < R.bodies.own; i++) {
     if (R.bodies.body[i].kind == BodyKind::Flexible) AddFlexible(R.bodies, i, e, b);
     else AddBody(R.bodies.body[i], R.bodies.now[i], R.bodies.gravity, b);

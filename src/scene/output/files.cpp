@@ -16,7 +16,7 @@ namespace hhtdae
 namespace
 {
 
-/* A field of a CSV file; quoted where it has to be */
+/* A field of a CSV file, quoted if necessary */
 std::string Field(const std::string &text)
 {
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
@@ -68,7 +68,8 @@ PetscErrorCode WriteWhole(const std::string &file, const std::string &text)
   const std::string part = file + ".part";
   struct stat       info;
   PetscFunctionBegin;
-  const bool special = stat(file.c_str(), &info) == 0 && !S_ISREG(info.st_mode); /* what is no regular file, /dev/null say, is written to */
+  /* a file that is not regular, such as /dev/null, is written directly and not replaced */
+  const bool special = stat(file.c_str(), &info) == 0 && !S_ISREG(info.st_mode);
   const char *name   = special ? file.c_str() : part.c_str();
   errno     = 0;
   FILE *out = std::fopen(name, "w");
@@ -137,7 +138,7 @@ public:
   Handle(const Handle &) = delete;
   operator hid_t() const { return id_; }
   bool good() const { return id_ >= 0; }
-  bool close() /* false if it fails: closing a file writes it */
+  bool close() /* false if it fails; closing a file writes the remaining data */
   {
     const bool closed = id_ < 0 || close_(id_) >= 0;
     id_               = -1;
@@ -149,7 +150,7 @@ private:
   herr_t (*close_)(hid_t);
 };
 
-/* Creates an empty dataset of unlimited length, with the groups in its name */
+/* Creates an empty dataset of unlimited length, and the groups that its name contains */
 hid_t CreateDataset(hid_t file, const std::string &name)
 {
   const hsize_t none = 0, any = H5S_UNLIMITED;
@@ -190,7 +191,7 @@ bool AppendDataset(hid_t file, bool first, const std::string &name, const std::s
   return set.good() && (!first || !unit || SetUnits(set, *unit)) && Append(set, values);
 }
 
-/* Suppresses HDF5's own error output; the message is given here */
+/* Opens or creates a file without HDF5's own error output; the caller reports an error */
 hid_t OpenFile(const std::string &file, bool first)
 {
   hid_t id;
@@ -204,7 +205,7 @@ hid_t OpenFile(const std::string &file, bool first)
 
 } // namespace
 
-/* The file is open only while a block is written: a run that is killed at another time leaves a complete file. */
+/* The file is open only while a block is written, so that a run that is killed at another time leaves a complete file. */
 PetscErrorCode AppendHDF5(const std::string &file, bool first, const TableHead &head, const Block &block)
 {
   const std::size_t   channels = head.name.size(), samples = block.time.size();

@@ -1,4 +1,4 @@
-/* Text and numbers of JSON that may stand inside a script element of HTML. */
+/* Text and numbers in JSON that can be embedded in a script element of HTML. */
 #ifndef HHTDAE_SCENE_OUTPUT_JSON_H
 #define HHTDAE_SCENE_OUTPUT_JSON_H
 
@@ -10,7 +10,7 @@
 namespace hhtdae
 {
 
-/* Quoted. '<' and '&' are escaped, too: "</script>" or "<!--" in a name must not end the element. */
+/* The text as a JSON string in quotes. '<' and '&' are escaped, too, so that "</script>" or "<!--" in a name does not end the script element. */
 inline std::string JSONText(const std::string &text)
 {
   std::string out = "\"";
@@ -25,12 +25,12 @@ inline std::string JSONText(const std::string &text)
   return out + '"';
 }
 
-/* JSON has no number that is not finite. */
+/* The number, or null if it is not finite, since JSON has no such numbers. */
 inline std::string JSONNumber(double x)
 {
   char number[32];
   if (!std::isfinite(x)) return "null";
-  std::snprintf(number, sizeof number, "%.12g", x + 0.0); /* no "-0" */
+  std::snprintf(number, sizeof number, "%.12g", x + 0.0); /* + 0.0 converts -0 to 0 */
   return number;
 }
 

@@ -9,9 +9,9 @@ namespace hhtdae
 namespace
 {
 
-constexpr int around = 24, rings = 12; /* facets of cylinders and spheres around the axis, and of spheres along it */
+constexpr int around = 24, rings = 12; /* numbers of facets: around the axis of cylinders and spheres, and along the axis of spheres */
 
-/* Adds points of a shape in its own axes, and cells between them */
+/* Adds points of a shape, given in the axes of the shape, and cells between them */
 class Builder
 {
 public:
@@ -95,7 +95,7 @@ void Octahedron(Builder &b, const Vector3 &h)
       }
 }
 
-/* A length of the scene, so that bodies without extent can be seen */
+/* A length of the scene, in proportion to which bodies without extent are drawn */
 double Size(const SceneData &s)
 {
   if (s.bodies.empty()) return 1;
@@ -114,7 +114,8 @@ double Size(const SceneData &s)
   return size > 0 ? size : 1;
 }
 
-/* Semiaxes a_k of the solid ellipsoid with the same mass and moments of inertia: I_1 = m (a_2^2 + a_3^2)/5 */
+/* Adds the default shape of a body. Its semiaxes a_k are those of the solid ellipsoid with the same mass and moments of
+   inertia, I_1 = m (a_2^2 + a_3^2)/5 */
 void Default(Mesh &m, const SceneData &s, PetscInt id, const std::vector<PetscInt> &markers, double size)
 {
   const BodyData &b    = s.bodies[id];

@@ -1,4 +1,4 @@
-/* The mesh of an animation, whose points are fixed to bodies. The same on every rank; only the first one uses it. */
+/* The mesh of an animation, whose points are fixed to bodies. It is the same on every rank; only the first rank uses it. */
 #ifndef HHTDAE_SCENE_OUTPUT_MESH_H
 #define HHTDAE_SCENE_OUTPUT_MESH_H
 
@@ -10,10 +10,10 @@ namespace hhtdae
 struct Mesh {
   struct Point {
     PetscInt body; /* -1: ground */
-    Vector3  s;    /* from the centre of mass, body axes */
+    Vector3  s;    /* position relative to the centre of mass, body axes */
   };
   struct Cells {
-    std::vector<PetscInt> body, point, end; /* of each cell: its body; points of all cells; where those of each cell end */
+    std::vector<PetscInt> body, point, end; /* body of each cell; points of all cells; end of each cell's points in `point` */
     void close(PetscInt b)
     {
       body.push_back(b);
@@ -24,8 +24,8 @@ struct Mesh {
   Cells              lines, polygons;
 };
 
-/* Shapes and lines of the user; for bodies that have none, lines from the centre of mass to the markers and an octahedron on the
-   axes of the ellipsoid that has the body's inertia */
+/* The mesh of the user's shapes and lines. Bodies without these have lines from the centre of mass to the markers and an
+   octahedron with its corners at the ends of the axes of the ellipsoid that has the body's inertia */
 Mesh MakeMesh(const SceneData &s);
 
 } // namespace hhtdae

@@ -1,4 +1,4 @@
-/* A mode as an animation: the state of the linearization with the shape at one phase after the other. */
+/* A mode as an animation: frames show the state of the linearization displaced by the mode shape at successive phases. */
 #include "scene/linearization.h"
 #include "scene/output/recorder.h"
 #include <cmath>

@@ -1,7 +1,8 @@
 /*
-  -scene_page: one HTML file that shows the run in three dimensions. The page, the description of the scene and the surfaces of flexible bodies
-  are written at the first frame, beside and renamed when they are on the disk; blocks of frames are appended, so that the file is whole after
-  each of them and a run that is killed leaves what it had. Every rank packs what it owns of a frame, the first rank writes.
+  -scene_page: one HTML file that shows the run in three dimensions. The page, the description of the scene and the surfaces
+  of flexible bodies are written at the first frame, to a temporary file that is renamed when it is on the disk. Blocks of
+  frames are appended; the file is complete after each of them, so that a run that is killed leaves all blocks written before.
+  Every rank packs its own values of a frame, the first rank writes.
 */
 #include "scene/extension.h"
 #include "scene/output/channels.h"
@@ -21,7 +22,7 @@ namespace hhtdae
 namespace
 {
 
-constexpr std::size_t page_pose = 7; /* numbers per body: position of the centre of mass, quaternion x, y, z, w */
+constexpr std::size_t page_pose = 7; /* number of values per body: position of the centre of mass, quaternion x, y, z, w */
 
 class Page : public Task
 {
@@ -101,19 +102,19 @@ public:
 
 private:
   std::string                           file_, title_;
-  std::vector<std::vector<std::size_t>> place_; /* in a frame, of what every rank packs */
-  std::vector<std::size_t>              modal_; /* of the modal coordinates of every body in a frame */
-  std::size_t                           tracks_ = 0, numbers_ = 0; /* of a frame: before the channels; in all */
-  std::size_t                           most_nodes_;               /* of all meshes together */
+  std::vector<std::vector<std::size_t>> place_; /* for each rank: positions in a frame of the values that it packs */
+  std::vector<std::size_t>              modal_; /* for each body: position in a frame of its modal coordinates */
+  std::size_t                           tracks_ = 0, numbers_ = 0; /* numbers of values in a frame: before the channels, and in total */
+  std::size_t                           most_nodes_;               /* largest number of nodes of all meshes together */
   std::vector<std::unique_ptr<PageMesh>> meshes_;
   std::vector<const Extension *>        mesh_of_;
-  std::vector<Eigen::Matrix3Xd>         rest_;  /* of each mesh, on the first rank: its nodes without deformation, from their mean */
-  PageFrames                            frames_; /* this and what follows: on the first rank */
+  std::vector<Eigen::Matrix3Xd>         rest_;  /* for each mesh, on the first rank: positions of its undeformed nodes relative to their mean */
+  PageFrames                            frames_; /* this and the following members are used on the first rank only */
   std::vector<double>                   last_; /* quaternions of the last frame */
   bool                                  there_ = false;
-  long                                  end_   = 0; /* bytes of the file */
+  long                                  end_   = 0; /* length of the file in bytes */
 
-  /* An error of the first rank is an error on all ranks: none waits for it */
+  /* Does work on the first rank. An error there is raised on all ranks, so that none waits for the first */
   template <class F> PetscErrorCode onFirst(const Runtime &R, const F &work) const
   {
     PetscFunctionBegin;
@@ -148,7 +149,7 @@ private:
 
   static PetscMPIInt ownerOf(const Runtime &R, std::size_t body) { return R.number.owner.empty() ? 0 : R.number.owner[body]; }
 
-  /* The meshes share the number of nodes evenly */
+  /* Makes the meshes; each has an equal share of the largest number of nodes */
   PetscErrorCode makeMeshes(const Runtime &R)
   {
     PetscFunctionBegin;
@@ -162,7 +163,7 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* Converts positions of nodes to displacements relative to the nearest rigid motion, whose pose it writes */
+  /* Converts positions x of nodes to displacements relative to the nearest rigid motion, and writes the pose of that motion */
   static void takeRigidMotion(const Eigen::Matrix3Xd &X, double *x, double *pose)
   {
     Eigen::Map<Eigen::Matrix3Xd> now(x, 3, X.cols());
@@ -172,7 +173,8 @@ private:
     for (double y : {fit.origin(0), fit.origin(1), fit.origin(2), q.x(), q.y(), q.z(), q.w()}) *pose++ = y;
   }
 
-  /* A frame: poses of all bodies, then of the meshes, which no rank packs; modal coordinates of the flexible bodies, channels, nodes of the meshes */
+  /* Sets the positions of all values in a frame: poses of all bodies, poses of the meshes (which the first rank
+     computes), modal coordinates of the flexible bodies, channels, nodes of the meshes */
   void placeAll(const Runtime &R)
   {
     const std::vector<BodyData> &bodies = R.scene.bodies;
@@ -190,7 +192,7 @@ private:
     numbers_ = tracks_ + ChannelOwners(R).size();
     for (const auto &m : meshes_) {
       const std::size_t all = (std::size_t)std::accumulate(m->nodes.begin(), m->nodes.end(), 0);
-      std::size_t       first = 0; /* node of a rank */
+      std::size_t       first = 0; /* first node of a rank */
       for (PetscMPIInt r = 0; r < R.size; first += (std::size_t)m->nodes[r++]) {
         for (std::size_t k = 3 * first; k < 3 * (first + (std::size_t)m->nodes[r]); k++) place_[r].push_back(numbers_ + k);
         if (m->stress)
@@ -240,7 +242,7 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* Chooses of the two quaternions of a rotation the one nearer to that of the previous frame: tracks without jumps compress better. */
+  /* Of the two quaternions of each rotation, chooses the one nearer to that of the previous frame, since tracks without jumps compress better. */
   void continueQuaternions(std::vector<double> &frame, std::size_t bodies)
   {
     last_.resize(4 * bodies, 0);
@@ -261,7 +263,7 @@ private:
       head += element;
     }
     for (std::size_t m = 0; m < meshes_.size(); m++) {
-      Surface   from_mean = meshes_[m]->surface; /* EncodeSurface() takes coordinates from the body's centre */
+      Surface   from_mean = meshes_[m]->surface; /* EncodeSurface() stores coordinates relative to the body's centre of mass */
       ModalBody none;
       Eigen::Map<Eigen::Matrix3Xd>(from_mean.point.data(), 3, rest_[m].cols()) = rest_[m];
       from_mean.shape.resize(3 * rest_[m].cols(), 0);

@@ -1,4 +1,5 @@
-/* The page without a scene: HTML, style, three.js with its licence, programs of src/scene/page; made when the library is built. */
+/* The part of a page that does not depend on the scene: HTML, style, three.js with its licence, programs of
+   src/scene/page. Generated when the library is built. */
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_ASSETS_H
 #define HHTDAE_SCENE_OUTPUT_PAGE_ASSETS_H
 
@@ -7,8 +8,8 @@
 namespace hhtdae
 {
 
-std::string PageHead();  /* empty: the library was built without it */
-const char *PageLacks(); /* what was missing then, "three.js (Debian: libjs-three)" */
+std::string PageHead();  /* empty if the library was built without it */
+const char *PageLacks(); /* what was missing when the library was built, such as "three.js (Debian: libjs-three)" */
 
 } // namespace hhtdae
 

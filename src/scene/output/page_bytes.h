@@ -1,5 +1,5 @@
 /*
-  Binary data of a page: little-endian bytes, compressed by zlib and written in base64, each sequence in a separate script element of
+  Binary data of a page: little-endian bytes, compressed by zlib and written in base64. Each sequence is in a separate script element of
   a type that browsers do not execute.
 */
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_BYTES_H
@@ -33,7 +33,7 @@ public:
     std::memcpy(&bits, &x, sizeof bits);
     whole(bits);
   }
-  /* Bytes of the same significance are stored together: slowly varying numbers compress far better then. */
+  /* Appends numbers "in planes": bytes of the same significance are stored together, since slowly varying numbers then compress far better. */
   void planes(const std::vector<std::uint16_t> &x) { inPlanes(x); }
   void planes(const std::vector<std::uint32_t> &x) { inPlanes(x); }
 
@@ -49,7 +49,7 @@ private:
   }
 };
 
-/* The element of the page; kind: "frames" */
+/* The script element that contains the bytes; kind: its purpose, such as "frames" */
 PetscErrorCode PageElement(const PageBytes &bytes, const std::string &kind, std::string *element);
 
 /* Zigzag coding of a difference as an unsigned number: 0, -1, 1, -2, ... become 0, 1, 2, 3, ... */

@@ -58,7 +58,8 @@ std::string ShapeText(const SceneData &s, const ShapeData &d)
   return ShapeText(kind[d.shape.kind], d.shape.size, d.body, at, d.shape.axes, d.shape.colour);
 }
 
-/* The solid box with the body's mass and moments of inertia, I_1 = m (a_2^2 + a_3^2)/3 for half edges a_k; empty if no box has this inertia */
+/* The solid box, as JSON, with the body's mass and moments of inertia, I_1 = m (a_2^2 + a_3^2)/3 for half edges a_k;
+   empty if no box has this inertia */
 std::string BoxOfInertia(const SceneData &s, PetscInt id)
 {
   const BodyData &b = s.bodies[id];
@@ -90,7 +91,7 @@ std::vector<std::string> BodyTexts(const SceneData &s, const Meshes &meshes)
   std::vector<char>                     drawn(s.bodies.size(), 0);
   std::vector<std::string>              out;
   std::vector<PetscInt>                 carrier;
-  std::vector<std::string>              rest; /* of the frames of attachments */
+  std::vector<std::string>              rest; /* undeformed positions of the frames of attachments */
   for (const BodyData &b : s.bodies) {
     carrier.push_back(b.carrier);
     rest.push_back(b.carrier < 0 ? "[]" : JSONNumbers(Vector3(s.bodies[b.carrier].flexible->place(b.attachment).position - s.bodies[b.carrier].center)));
@@ -101,10 +102,11 @@ std::vector<std::string> BodyTexts(const SceneData &s, const Meshes &meshes)
       carrier[b]       = (PetscInt)(s.bodies.size() + m);
       rest[b]          = JSONNumbers(Vector3(s.bodies[b].r - Mean(meshes[m]->surface.point)));
     }
-  for (const SurfaceData &d : s.surfaces) drawn[d.body] = 1; /* and no shape of the user, which would lie inside of it */
+  /* a body with a surface is drawn without shapes of the user, which would be inside the surface */
+  for (const SurfaceData &d : s.surfaces) drawn[d.body] = 1;
   for (const ShapeData &d : s.shapes)
     if (d.body >= 0 && !drawn[d.body]) shapes[d.body].push_back(ShapeText(s, d));
-  for (const std::vector<PetscInt> &line : s.lines) { /* a line that stays on a body shows it */
+  for (const std::vector<PetscInt> &line : s.lines) { /* a line with all its markers on one body counts as the shape of this body */
     const PetscInt first = s.markers[line[0]].body;
     if (first >= 0 && std::all_of(line.begin(), line.end(), [&](PetscInt m) { return s.markers[m].body == first; })) drawn[first] = 1;
   }
@@ -136,7 +138,7 @@ std::vector<std::string> ElementTexts(const SceneData &s)
   return out;
 }
 
-/* Against gravity; without it along z, in the plane along y */
+/* Direction that is up in the page: against gravity; without gravity z, or y in planar scenes */
 Vector3 Up(const SceneData &s)
 {
   const double g = s.gravity.norm();

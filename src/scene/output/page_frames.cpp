@@ -10,20 +10,20 @@ namespace hhtdae
 namespace
 {
 
-constexpr std::size_t   max_block_frames = 128;     /* frames of a block: a run that is killed loses at most these */
-constexpr std::size_t   max_block_bytes  = 8 << 20; /* memory of a block */
+constexpr std::size_t   max_block_frames = 128;     /* largest number of frames in a block; a run that is killed loses at most these */
+constexpr std::size_t   max_block_bytes  = 8 << 20; /* largest memory of a block */
 constexpr double        track_levels     = 65534;   /* values of a track are coded as 0 to 65534 */
-constexpr std::uint16_t missing_code     = 65535;   /* not finite, or beyond 1e300 */
+constexpr std::uint16_t missing_code     = 65535;   /* code of a value that is not finite, or beyond 1e300 */
 constexpr float         max_node_level   = 4095;    /* displacements of nodes are coded as -4095 to 4095 in a block */
 
-/* Finite, and far enough from the end of the numbers for differences of two */
+/* Whether x is finite and small enough that differences of two such numbers do not overflow */
 bool Usable(double x) { return std::abs(x) < 1e300; }
 
 struct Range {
   double low = 0, step = 0;
 };
 
-/* Of the usable values */
+/* The range of the usable values */
 Range RangeOf(const std::vector<double> &x)
 {
   double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -115,7 +115,7 @@ void PageFrames::encodeChannels(PageBytes &out) const
   out.planes(bits);
 }
 
-/* nodes x frames */
+/* stress: nodes x frames */
 static void EncodeStress(const Eigen::MatrixXf &stress, PageBytes &out)
 {
   const Eigen::Index         n = stress.cols();
@@ -155,7 +155,7 @@ void PageFrames::encodeNodes(const PageNodes &m, std::size_t first, PageBytes &o
   float                      largest = 0;
   const auto                 at      = [&](std::size_t frame, std::size_t k) {
     const float x = number_[frame * numbers_ + first + k];
-    return std::isfinite(x) ? x : 0.f; /* the body is at no finite place then, and not shown */
+    return std::isfinite(x) ? x : 0.f; /* if it is not finite, neither is the pose of the body, which is then not shown */
   };
   for (std::size_t i = 0; i < n; i++)
     for (std::size_t k = 0; k < tracks; k++) largest = std::max(largest, std::abs(at(i, k)));

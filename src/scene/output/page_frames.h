@@ -1,14 +1,15 @@
 /*
-  Frames of a page, collected in memory and written in blocks. A block can be read without those before it.
+  Frames of a page, collected in memory and written in blocks. Each block can be read without the blocks before it.
 
     u32 frames;  f64 time of each
     for every track: f64 low, f64 step     value = low + step * code, code 65535: not finite, or beyond 1e300
     codes of the tracks, track by track: u16 differences from one frame to the next (the first from 0), in zigzag order, in planes
     channels, one after the other: f32, in planes
-    for every surface, in their order, as far as it has them:
-      nodes that move by themselves: f32 step; u16 codes of their displacements in the axes of their body, node by node x, y, z: differences from one frame
+    for every surface, in their order, if it has them:
+      nodes that move individually: f32 step; u16 codes of their displacements in the axes of their body, node by node x, y,
+      z: differences from one frame
         to the next (the first from 0), in zigzag order, in planes
-      stress: largest of every node, f32 in planes; u8 differences of round(255 value / largest), node by node
+      stress: largest value at every node, f32 in planes; u8 differences of round(255 value / largest), node by node
 */
 #ifndef HHTDAE_SCENE_OUTPUT_PAGE_FRAMES_H
 #define HHTDAE_SCENE_OUTPUT_PAGE_FRAMES_H
@@ -19,10 +20,10 @@
 namespace hhtdae
 {
 
-/* A surface with modes whose stress at the nodes is computed for a whole block at once */
+/* A surface with modes; the stress at its nodes is computed for a whole block at once */
 struct PageField {
   const Surface *surface;
-  std::size_t    first; /* of its modal coordinates among the tracks */
+  std::size_t    first; /* number of its first modal coordinate among the tracks */
 };
 
 /* A surface whose nodes move individually: per frame three displacements of each node, then the stress at each node */
@@ -43,7 +44,7 @@ public:
   }
 
   std::size_t frames() const { return time_.size(); }
-  /* tracks: coordinates of bodies and modes; moving: the numbers of all PageNodes */
+  /* Adds a frame. tracks: coordinates of bodies and modes; moving: the values of all PageNodes */
   void add(double time, const double *tracks, const double *channels, const double *moving = nullptr);
   /* Whether the block has reached its largest memory or number of frames */
   bool      full() const;

@@ -27,7 +27,8 @@ std::string SurfaceFault(const Surface &s, const ModalBody &m)
 
 PageBytes EncodeSurface(const Surface &s, const ModalBody &m)
 {
-  constexpr double           max_levels = 8191, min_levels = 31; /* shapes of a mode are coded as integers of at most this magnitude: slowest mode, and the least for fast ones */
+  /* shapes of a mode are coded as integers of at most this magnitude: for the slowest mode, and for the fastest ones */
+  constexpr double           max_levels = 8191, min_levels = 31;
   const Eigen::Index         modes = m.modes();
   PageBytes                  out;
   std::vector<std::uint32_t> words;
@@ -60,7 +61,7 @@ PageBytes EncodeSurface(const Surface &s, const ModalBody &m)
 
 void SurfaceStress(const Surface &s, const Eigen::MatrixXf &eta, Eigen::MatrixXf *von_mises)
 {
-  constexpr Eigen::Index nodes_at_a_time = 256; /* so few that their data stay in the cache */
+  constexpr Eigen::Index nodes_at_a_time = 256; /* small enough that their data stay in the cache */
   const Eigen::Index     nodes = s.stress.rows() / 6;
   Eigen::MatrixXf        x;
   von_mises->resize(nodes, eta.cols());

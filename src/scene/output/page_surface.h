@@ -9,16 +9,16 @@
 namespace hhtdae
 {
 
-/* Error of a surface as text, empty if there is none */
+/* What is wrong with a surface, as text; empty if nothing */
 std::string SurfaceFault(const Surface &s, const ModalBody &m);
 
 /*
     u32 nodes, triangles, modes
-    f32 coordinates from the undeformed centre of mass, in planes;  u32 nodes of the triangles, in planes
+    f32 coordinates relative to the undeformed centre of mass, in planes;  u32 nodes of the triangles, in planes
     f32 step of every mode;  codes of each mode, its x, y, z one after the other: u16 in zigzag order, in planes; displacement = step * code
 
-  A force of given size deflects the body in mode k in proportion to 1/omega_k^2, so the codes are coarser by that factor, which makes the errors of
-  displacements equal for all modes. The largest code is 8,191 for the slowest mode, and at least 31.
+  A given force deflects the body in mode k in proportion to 1/omega_k^2. The codes are coarser for faster modes by that factor, so that the errors of
+  displacements are equal for all modes. The largest code is 8,191 for the slowest mode, and at least 31 for the others.
 */
 PageBytes EncodeSurface(const Surface &s, const ModalBody &m);
 

@@ -36,7 +36,7 @@ PetscErrorCode RecordAt(Recorder &r, TS ts, double t, const std::vector<Task *> 
   PetscFunctionReturn(0);
 }
 
-/* The next sample time of a task up to t, with rounding; infinity if it is later */
+/* The next sample time of a task if it is at most t, up to rounding; else infinity */
 double Due(const Recorder &r, const Task &task, double t)
 {
   constexpr double never = std::numeric_limits<double>::infinity();
@@ -46,7 +46,7 @@ double Due(const Recorder &r, const Task &task, double t)
   return due <= t + 1e-9 * task.dt ? std::min(due, t) : never;
 }
 
-/* Takes all samples of the step that ends at t, at each sample time for all tasks that are due */
+/* Takes all samples of the step that ends at t. At each sample time the state is evaluated once for all tasks that are due */
 PetscErrorCode RecordStep(Recorder &r, TS ts, double t)
 {
   std::vector<Task *> now;
@@ -59,7 +59,7 @@ PetscErrorCode RecordStep(Recorder &r, TS ts, double t)
       next   = std::min(next, due[k]);
     }
     if (next > t) break;
-    ended = next == t; /* tasks with dt = 0 are due at t only once */
+    ended = next == t; /* tasks with dt = 0 are due only once at t */
     now.clear();
     for (std::size_t k = 0; k < due.size(); k++)
       if (due[k] == next) now.push_back(r.tasks[k].get());
@@ -70,20 +70,21 @@ PetscErrorCode RecordStep(Recorder &r, TS ts, double t)
   PetscFunctionReturn(0);
 }
 
-/* Accelerations and multipliers of the start are not known before the first step, and an initial state may be corrected there: the
-   first sample waits for it. */
+/* The first sample is taken after the first step: accelerations and multipliers of the start are not known before, and
+   the first step may correct the initial state. */
 PetscErrorCode Monitor(TS ts, PetscInt step, PetscReal t, Vec, void *ctx)
 {
   Runtime &R = *static_cast<Runtime *>(ctx);
   PetscFunctionBegin;
-  if (step < 0) PetscFunctionReturn(0); /* a final time inside the last step, which has been sampled */
+  /* TSSolve() reports an interpolated final time with step = -1; it is within the last step, which has been sampled */
+  if (step < 0) PetscFunctionReturn(0);
   Recorder &r = *R.recorder;
   if (!r.begun) {
     r.begun = true;
     r.begin = r.last = t;
     if (r.dense) PetscFunctionReturn(0);
     PetscCall(RecordStep(r, ts, t));
-  } else if (t > r.last) { /* not after a roll-back */
+  } else if (t > r.last) { /* t is not larger after a roll-back */
     PetscCall(RecordStep(r, ts, t));
   }
   PetscFunctionReturn(0);
@@ -131,7 +132,7 @@ PetscErrorCode ReadOptions(TS ts, OutputSettings &o)
   PetscFunctionReturn(0);
 }
 
-/* A page has so many frames in the time to the end; a run without an end has one at every step. */
+/* Computes the time between the frames of a page from their number and the end time; a run without an end time has a frame at every step. */
 PetscErrorCode SpreadFrames(TS ts, OutputSettings &o)
 {
   PetscReal t, end;
@@ -169,7 +170,7 @@ PetscErrorCode FallBack(Recorder &r, TS ts)
 
 } // namespace
 
-/* An error if the time between samples is below the rounding of the times: sample times would not increase */
+/* An error if the time between samples is so small that rounding would make sample times equal */
 static PetscErrorCode CheckDistances(const Recorder &r, TS ts)
 {
   PetscReal t, end;
@@ -190,8 +191,9 @@ Recorder::~Recorder()
   for (Vec *x : {&U, &V, &A}) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(x));
 }
 
-/* If a checkpoint was loaded after TSSetUp() but before the recorder existed, its numbers are in the vector, and the run continues the
-   same files. Otherwise they are zero, or, after Scene::createTS(&next, ts), those of the other run: then this one has made no step. */
+/* If a checkpoint was loaded after TSSetUp() but before the recorder existed, the recorder's numbers are in the vector
+   Runtime::axes, and the run continues the same files. Otherwise they are zero, or, after Scene::createTS(&next, ts),
+   those of the other run; in that case this run has made no step. */
 static PetscErrorCode ResumeFromLoaded(Runtime &R, TS ts, PetscReal t)
 {
   const double *x;
@@ -200,7 +202,7 @@ static PetscErrorCode ResumeFromLoaded(Runtime &R, TS ts, PetscReal t)
   PetscCall(TSGetStepNumber(ts, &steps));
   PetscCall(VecGetLocalSize(R.axes, &n));
   PetscCall(VecGetArrayRead(R.axes, &x));
-  const std::vector<double> stood(x + n - checkpoint_numbers + 2, x + n); /* behind the digest, kept.cpp */
+  const std::vector<double> stood(x + n - checkpoint_numbers + 2, x + n); /* the recorder's numbers follow the digest, kept.cpp */
   PetscCall(VecRestoreArrayRead(R.axes, &x));
   if (steps && stood[0] && stood[2] == t) PetscCall(ResumeOutput(R, stood.data()));
   PetscFunctionReturn(0);
@@ -213,7 +215,7 @@ PetscErrorCode AttachOutput(Runtime &R, const OutputSettings &settings, TS ts)
   Vec            U;
   PetscFunctionBegin;
   PetscCall(TSGetTime(ts, &t));
-  if (R.recorder) { /* a further solve goes on */
+  if (R.recorder) { /* a further TSSolve() continues the same output */
     if (t == R.recorder->last) PetscFunctionReturn(0);
     R.recorder->begun = false;
     for (auto &task : R.recorder->tasks) task->done = 0;
@@ -289,7 +291,8 @@ PetscErrorCode SaveOutput(Runtime &R, double *x)
   PetscFunctionReturn(0);
 }
 
-/* Resumes at the state of a checkpoint. Tasks that it does not contain begin at their next sample time, counted from the same first sample. */
+/* Resumes the output at the state of a checkpoint. Tasks that the checkpoint does not contain begin at their next sample
+   time, counted from the same first sample. */
 PetscErrorCode ResumeOutput(Runtime &R, const double *x)
 {
   PetscFunctionBegin;

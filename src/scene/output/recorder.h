@@ -16,28 +16,28 @@ public:
   explicit Task(double dt) : dt(dt) {}
   virtual ~Task() = default;
   virtual PetscErrorCode record(Runtime &R, Evaluation &e) = 0; /* adds a sample; all functions are collective */
-  virtual PetscErrorCode stepped(Runtime &) { return 0; }       /* after the samples of a step */
-  virtual PetscErrorCode finish(Runtime &) { return 0; }        /* at the end of a solve; there may be another one */
-  virtual int            slot() const                        = 0; /* number of its block of task_numbers values in a checkpoint */
+  virtual PetscErrorCode stepped(Runtime &) { return 0; }       /* called after all samples of a step */
+  virtual PetscErrorCode finish(Runtime &) { return 0; }        /* called at the end of TSSolve(), which may be called again */
+  virtual int            slot() const                        = 0; /* number of the task's block of task_numbers values in a checkpoint */
   virtual PetscErrorCode save(Runtime &R, double *x)         = 0; /* writes all samples to the files and stores their lengths in x */
   virtual PetscErrorCode resume(Runtime &R, const double *x) = 0; /* truncates the files to these lengths and continues there */
 
-  double dt;                     /* time between samples, s; 0: the end of every step */
-  double done           = 0;     /* number of sample times so far since the recording began, also if this task began later */
-  bool   from_equations = false; /* it reads accelerations, multipliers or quantities that depend on them */
+  double dt;                     /* time between samples, s; 0: a sample at the end of every step */
+  double done           = 0;     /* number of sample times since the recording began, even if this task began later */
+  bool   from_equations = false; /* whether the task reads accelerations, multipliers or quantities that depend on them */
 };
 
-/* Number of tasks, and of values in a checkpoint for each */
+/* Largest number of tasks, and number of values of each in a checkpoint */
 constexpr int task_slots = 4, task_numbers = 15;
 static_assert(recorder_numbers >= 4 + task_slots * (task_numbers + 1), "room for all tasks");
 
 struct Recorder {
   Runtime                           &R;
-  bool                               dense = true; /* the TS is TSHHT3, which has values between the ends of steps, and accelerations */
+  bool                               dense = true; /* whether the TS is of type TSHHT3, which has states within steps, and accelerations */
   bool                               begun = false;
   double                             begin = 0, last = 0; /* times of the first sample and of the end of the last recorded step */
   Vec                                U = nullptr, V = nullptr, A = nullptr;
-  std::vector<double>                acceleration; /* of the local unknowns */
+  std::vector<double>                acceleration; /* accelerations of the local unknowns */
   std::vector<std::unique_ptr<Task>> tasks;
 
   explicit Recorder(Runtime &r) : R(r) {}

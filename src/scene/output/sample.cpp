@@ -1,4 +1,4 @@
-/* Scene::sample(): the channels at one time, without a file. */
+/* Scene::sample(): values of the channels at one time, without output files. */
 #include "scene/guard.h"
 #include "scene/output/channels.h"
 
@@ -8,7 +8,7 @@ namespace hhtdae
 namespace
 {
 
-/* Every rank's own values, rank by rank, to the order of the channels on every rank */
+/* Gathers the ranks' own values; `values` has them in the order of the channels on every rank */
 PetscErrorCode Share(const Runtime &R, const std::vector<double> &own, std::vector<double> &values)
 {
   const std::vector<PetscMPIInt> &owner = ChannelOwners(R);
@@ -32,7 +32,7 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
   std::vector<double> own, acceleration;
   PetscFunctionBegin;
   Runtime *run;
-  TS       copy = nullptr; /* of a run that has not begun */
+  TS       copy = nullptr; /* BeginCopy() of a run that has not begun */
   PetscCall(FindRun(*this, ts, "Scene::sample()", &run));
   PetscCall(ReadCheckpoint(ts));
   for (Vec &x : W) {

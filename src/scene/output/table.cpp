@@ -1,4 +1,4 @@
-/* Samples of the channels: every rank has its own, the first rank collects and writes them in blocks. */
+/* Samples of the channels: every rank evaluates its own channels, the first rank collects the values and writes them in blocks. */
 #include "scene/output/table.h"
 #include "scene/output/channels.h"
 #include "scene/output/recorder.h"
@@ -10,7 +10,7 @@ namespace hhtdae
 namespace
 {
 
-/* A block is written when it has this many samples, or when its first one is this many seconds of real time old */
+/* A block is written when it has this many samples, or when its first sample is older than this many seconds of real time */
 constexpr std::size_t max_block_samples = 256;
 constexpr double      max_block_age     = 10;
 
@@ -34,7 +34,7 @@ public:
     if (time_.empty()) PetscCall(PetscTime(&since_));
     time_.push_back(e.t);
     PetscCall(ChannelValues(R, e, own_));
-    if (time_.size() >= max_block_samples) PetscCall(write(R)); /* a step may be long, and samples close */
+    if (time_.size() >= max_block_samples) PetscCall(write(R)); /* a long step may contain many samples */
     PetscFunctionReturn(0);
   }
 
@@ -44,7 +44,7 @@ public:
     PetscFunctionBegin;
     if (time_.empty()) PetscFunctionReturn(0);
     PetscCall(PetscTime(&now));
-    int full = now - since_ > max_block_age; /* as the first rank's clock says */
+    int full = now - since_ > max_block_age; /* by the clock of the first rank */
     if (R.size > 1) PetscCallMPI(MPI_Bcast(&full, 1, MPI_INT, 0, R.scene.comm));
     if (full) PetscCall(write(R));
     PetscFunctionReturn(0);
@@ -82,14 +82,14 @@ public:
 private:
   TableHead                             head_;
   std::string                           csv_, hdf5_;
-  std::vector<std::vector<std::size_t>> column_; /* channels of every rank */
+  std::vector<std::vector<std::size_t>> column_; /* numbers of the channels of every rank */
   std::vector<double>                   time_, own_;
   PetscLogDouble                        since_ = 0;
-  std::size_t                           rows_    = 0; /* in the files */
-  long                                  csv_end_ = 0; /* bytes */
-  bool                                  csv_there_ = false, hdf5_there_ = false; /* begun: on the first rank */
+  std::size_t                           rows_    = 0; /* number of samples in the files */
+  long                                  csv_end_ = 0; /* length of the CSV file in bytes */
+  bool                                  csv_there_ = false, hdf5_there_ = false; /* whether the files exist; on the first rank */
 
-  /* The block on the first rank, channels in their order */
+  /* Gathers the block on the first rank, with the channels in their order */
   PetscErrorCode collect(const Runtime &R, Block &block)
   {
     std::vector<int>    count(R.size), start(R.size + 1, 0);

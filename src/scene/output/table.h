@@ -1,4 +1,4 @@
-/* Files of sampled channels. Blocks of samples are appended, so that an aborted run leaves the earlier ones. */
+/* Files of sampled channels. Blocks of samples are appended, so that the files of an aborted run contain all blocks written before. */
 #ifndef HHTDAE_SCENE_OUTPUT_TABLE_H
 #define HHTDAE_SCENE_OUTPUT_TABLE_H
 
@@ -9,7 +9,7 @@
 namespace hhtdae
 {
 
-/* Samples of all channels, one after the other in time; on the first rank */
+/* Samples of all channels in the order of time; on the first rank */
 struct Block {
   std::vector<double> time, values; /* values[sample * channels + channel] */
 };
@@ -18,11 +18,11 @@ struct TableHead {
   std::vector<std::string> name, unit; /* of the channels */
 };
 
-/* first: begins the file anew. *end: its length then. */
+/* Append a block; first: begins a new file. *end: as in AppendText() */
 PetscErrorCode AppendCSV(const std::string &file, bool first, const TableHead &head, const Block &block, long *end);
 PetscErrorCode AppendHDF5(const std::string &file, bool first, const TableHead &head, const Block &block);
 
-/* ShortenFile() by rows */
+/* The same as ShortenFile(), with the length as a number of samples */
 PetscErrorCode ShortenHDF5(const std::string &file, std::size_t rows, const TableHead &head, bool *there);
 
 } // namespace hhtdae

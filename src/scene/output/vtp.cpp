@@ -18,7 +18,7 @@ bool BigEndian()
   return first == 0;
 }
 
-/* The number of bytes, and the bytes */
+/* Appends a DataArray element: the number of bytes, then the bytes */
 template <class T> void Array(std::string &out, const char *type, const char *name, const char *more, const std::vector<T> &values)
 {
   const std::uint64_t        bytes = values.size() * sizeof(T);
