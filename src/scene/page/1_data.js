@@ -1,9 +1,10 @@
-/* The page's data: script elements with base64 of zlib's deflate, laid out as src/scene/output/page_frames.h and page_surface.h say. */
+/* Reads the page's data: script elements in base64 of zlib's deflate, in the formats described in
+   src/scene/output/page_frames.h and page_surface.h. */
 
 async function unpack(element) {
   const text = atob(element.textContent.trim()), bytes = new Uint8Array(text.length);
   for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
-  element.textContent = ''; /* the text is not needed twice in memory */
+  element.textContent = ''; /* frees the text, which is no longer needed */
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
   return new Reader(await new Response(stream).arrayBuffer());
 }
@@ -18,7 +19,7 @@ class Reader {
   f32() { this.at += 4; return this.view.getFloat32(this.at - 4, true); }
   f64() { this.at += 8; return this.view.getFloat64(this.at - 8, true); }
   u8s(n) { this.at += n; return this.bytes.subarray(this.at - n, this.at); }
-  /* n numbers whose bytes of equal weight stand together */
+  /* n numbers in planes: bytes of the same significance are stored together */
   u16s(n) {
     const x = new Uint16Array(n), b = this.u8s(2 * n);
     for (let i = 0; i < n; i++) x[i] = b[i] | b[n + i] << 8;
@@ -54,7 +55,7 @@ function readSurface(r) {
   return s;
 }
 
-/* Displacements of nodes that move by themselves, in the axes of their body: frame by frame a step and the codes that it multiplies */
+/* Displacements of nodes that move individually, in the axes of their body; displacement = step * code, with a step for each frame */
 function readMotion(r, s, n) {
   const step = r.f32(), code = r.u16s(3 * s.nodes * n), frames = [];
   for (let i = 0; i < n; i++) frames.push({step, code: new Int16Array(3 * s.nodes), largest: 0});
@@ -67,7 +68,7 @@ function readMotion(r, s, n) {
   s.motion.push(...frames);
 }
 
-/* All frames of a block, appended to the run */
+/* Appends all frames of a block to the run */
 function readFrames(r, run) {
   const n = r.u32(), tracks = run.tracks, first = run.time.length;
   for (let i = 0; i < n; i++) run.time.push(r.f64());
@@ -96,8 +97,8 @@ function readFrames(r, run) {
 }
 
 /*
-  The run: scene (its description), time of the frames, frame (of each its tracks: 7 numbers per body, then modal coordinates), surfaces.
-  A page whose writer was stopped in the middle of a block ends with what cannot be unpacked: that is left out, and said.
+  The run: scene (its description), time (of the frames), frame (the tracks of each frame: 7 numbers per body, then modal coordinates), surfaces.
+  If writing the page was interrupted in the middle of a block, this last block cannot be unpacked: it is left out, and a notice says so.
 */
 async function readRun(progress) {
   const scene = JSON.parse(document.getElementById('scene').textContent);
@@ -122,7 +123,7 @@ async function readRun(progress) {
   return run;
 }
 
-/* The frame before time t, and how far t is from it to the next one */
+/* The number of the frame before time t, and the fraction of the way from it to the next frame, 0 to 1 */
 function placeInTime(run, t) {
   const time = run.time, n = time.length;
   if (n < 2 || !(t > time[0])) return [0, 0];
@@ -136,7 +137,7 @@ function placeInTime(run, t) {
   return [low, (t - time[low]) / (time[high] - time[low])];
 }
 
-/* Tracks at time t: positions and modes along lines, quaternions the short way round */
+/* Tracks at time t: positions and modal coordinates are interpolated linearly, quaternions along the shorter of the two arcs */
 function framesAt(run, t) {
   const [k, s] = placeInTime(run, t), a = run.frame[k];
   if (!a || s === 0) return a;
@@ -155,7 +156,7 @@ function framesAt(run, t) {
   return x;
 }
 
-/* von Mises stress at a node and time */
+/* The von Mises stress at a node at time t */
 function stressAt(surface, run, node, t) {
   const [k, s] = placeInTime(run, t), at = f => f.largest[node] * f.code[node] / 255;
   const a = surface.field[k], b = surface.field[Math.min(k + 1, surface.field.length - 1)];

@@ -1,4 +1,4 @@
-/* Numbers as people read them. */
+/* Formats numbers for display. */
 
 const superscript = n => String(n).replace(/[-0-9]/g, c => c === '-' ? '⁻' : '⁰¹²³⁴⁵⁶⁷⁸⁹'[c]);
 
@@ -13,7 +13,7 @@ function formatNumber(x, digits = 4) {
   return String(Number(x.toPrecision(digits))).replace('-', '−');
 }
 
-/* With a prefix where the unit takes one: "123 MPa" */
+/* A number with its unit, and with a prefix if the unit may have one: "123 MPa" */
 function formatWithUnit(x, unit, digits = 4) {
   if (/^(Pa|N|W|J|Hz)$/.test(unit) && Math.abs(x) >= 1e3) {
     const power = Math.min(4, Math.floor(Math.log10(Math.abs(x)) / 3));
@@ -22,18 +22,19 @@ function formatWithUnit(x, unit, digits = 4) {
   return formatNumber(x, digits) + (unit ? ' ' + unit : '');
 }
 
-/* Round distances for about `count` intervals: 1, 2 or 5 times a power of ten */
+/* A round step, 1, 2 or 5 times a power of ten, that divides a range into about `count` intervals */
 function roundStep(range, count) {
   const rough = range / count, power = 10 ** Math.floor(Math.log10(rough));
   for (const m of [1, 2, 5, 10]) if (m * power >= rough) return m * power;
 }
 
-/* As many digits as tell numbers up to `size` apart by `step` */
+/* The number of digits that distinguishes numbers of magnitude up to `size` that differ by `step` */
 function digitsFor(size, step) {
   return step > 0 && size > 0 ? Math.min(15, Math.max(4, 1 + Math.floor(Math.log10(size) + 1e-9) - Math.floor(Math.log10(step) + 1e-9))) : 4;
 }
 
-/* Times up to `size` that are told apart by `step`; those of a short run in a power of ten that they share: "0.70 / 1.00 · 10⁻⁶" */
+/* Times of magnitude up to `size`, with the digits that distinguish times that differ by `step`; times of a short run
+   have a common power of ten: "0.70 / 1.00 · 10⁻⁶" */
 function formatTimes(times, size, step) {
   const power = size > 0 && size < 1e-3 ? Math.floor(Math.log10(size)) : 0, digits = Math.min(12, Math.max(0, power - Math.floor(Math.log10(step))));
   return times.map(t => (t / 10 ** power).toFixed(digits)).join(' / ') + (power ? ' · 10' + superscript(power) : '');

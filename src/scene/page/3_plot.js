@@ -1,4 +1,4 @@
-/* A plot over time on a canvas, with a cursor at the time shown; dragging on it moves the time. */
+/* A plot over time on a canvas, with a cursor at the time shown; dragging in the plot changes the time. */
 
 const seriesColours = ['#1f6feb', '#d9730d', '#2a9d5c'];
 
@@ -24,7 +24,7 @@ class Plot {
 
   timeRange() { return [this.time[0], this.time[this.time.length - 1]]; }
 
-  /* Range of the values, a little wider than they are */
+  /* Sets the range of the vertical axis, a little wider than that of the values */
   measure() {
     let low = Infinity, high = -Infinity;
     for (const s of this.series)
@@ -55,7 +55,7 @@ class Plot {
     this.drawCursor(g, t, place);
   }
 
-  /* All but the cursor, on a canvas that is kept: strokes of many samples take longer than all else that is drawn */
+  /* Draws everything except the cursor on a separate canvas, which is reused: drawing curves with many samples takes longer than everything else */
   drawCurves(width, height, ratio) {
     for (const canvas of [this.canvas, this.picture]) {
       canvas.width = Math.round(width * ratio);
@@ -106,7 +106,7 @@ class Plot {
     });
   }
 
-  /* Samples through which the curve is drawn: of those in one column of pixels the first, the lowest, the highest and the last */
+  /* The samples through which the curve is drawn: in each column of pixels the first, the lowest, the highest and the last one */
   visible(value, ratio) {
     const column = k => Number.isFinite(value[k]) ? Math.floor(ratio * this.x(this.time[k])) : NaN, list = [];
     for (let k = 0; k < value.length;) {

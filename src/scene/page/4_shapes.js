@@ -1,10 +1,10 @@
-/* Geometries of shapes, joints and springs. Lengths are the scene's; `size` is the extent of the scene at its first frame. */
+/* Geometries of shapes, joints and springs. Lengths are in the unit of the scene; `size` is the extent of the scene at its first frame. */
 
 const bodyColours = ['#4e79a7', '#f28e2b', '#59a14f', '#b07aa1', '#e15759', '#3fa7a3', '#d4a72c', '#9c755f', '#e377a2', '#7f9b4a'];
 
-const zUp = geometry => geometry.rotateX(Math.PI / 2); /* three.js has the axes of cylinders along y */
+const zUp = geometry => geometry.rotateX(Math.PI / 2); /* in three.js the axes of cylinders are along y */
 
-/* Equal shapes share a geometry: scenes may have thousands. */
+/* Equal shapes share a geometry, since a scene may have thousands of them. */
 const made = new Map();
 function once(key, make) {
   if (!made.has(key)) made.set(key, make());
@@ -12,7 +12,7 @@ function once(key, make) {
 }
 
 const edgesOf = geometry => once('edges ' + geometry.id, () => new THREE.EdgesGeometry(geometry, 30));
-const rod = radius => once('rod ' + radius, () => new THREE.CylinderBufferGeometry(radius, radius, 1, 12)); /* of length one along y */
+const rod = radius => once('rod ' + radius, () => new THREE.CylinderBufferGeometry(radius, radius, 1, 12)); /* a cylinder of length one along y */
 
 function shapeGeometry(shape, guess, reach) {
   let [a, b, c] = shape.size;
@@ -36,7 +36,7 @@ function coilGeometry(radius, length) {
   return new THREE.TubeBufferGeometry(new Coil(), 24 * turns, wire, 6).scale(1, 1 / length, 1);
 }
 
-/* What stands for a joint, z along the axis of its marker; null: nothing */
+/* The symbol of a joint, with z along the z axis of its marker; null if the type has no symbol */
 function jointGeometry(type, s) {
   if (/revolute|cylindrical|screw/.test(type)) return once('pin', () => zUp(new THREE.CylinderBufferGeometry(0.75 * s, 0.75 * s, 2.6 * s, 24)));
   if (/spherical|universal|constant velocity/.test(type)) return once('ball', () => new THREE.SphereBufferGeometry(s, 24, 16));
@@ -44,8 +44,9 @@ function jointGeometry(type, s) {
   return null;
 }
 
-/* Nodes on edges of a surface become several vertices, one for each side, so that the edge stays sharp in the light: faces around a node whose normals
-   are within 60 degrees share one. Returns the node of every vertex, and the triangles by vertices. */
+/* Splits nodes on edges of a surface into several vertices, one for each side, so that edges are shaded sharply: faces at
+   a node share a vertex if their normals are within 60 degrees. Returns the node of every vertex, and the vertices of the
+   triangles. */
 function splitAtCreases(s) {
   const faces = s.triangle.length / 3, normal = new Float32Array(s.triangle.length), share = 0.5;
   const [a, b, c] = [0, 1, 2].map(() => new THREE.Vector3());
@@ -67,7 +68,7 @@ function splitAtCreases(s) {
   return {node: Uint32Array.from(node), index};
 }
 
-/* Colours of stress from none to the largest */
+/* Colours of stress, as fractions of the largest one shown */
 const stressStops = [[0, '#30408f'], [0.15, '#3f7fd6'], [0.32, '#35b6c9'], [0.5, '#58c865'], [0.68, '#d8d62f'], [0.84, '#f28a22'], [1, '#c5141d']];
 const stressTable = (() => {
   const table = [], a = new THREE.Color();

@@ -1,4 +1,4 @@
-/* The scene in three dimensions: built once from the description, then moved to any time of the run. */
+/* The scene in three dimensions. It is built once from the description, then moved to the time shown. */
 
 class Model {
   constructor(run) {
@@ -12,8 +12,8 @@ class Model {
     });
     this.ground = new THREE.Group();
     this.scene3.add(this.ground);
-    this.symbols = []; /* of joints */
-    this.spans = [];   /* what stretches between two places: {a, b, mesh} */
+    this.symbols = []; /* symbols of joints */
+    this.spans = [];   /* meshes that extend from place a to place b: {a, b, mesh} */
     this.deflection = 1;
     this.hasSurface = this.bodies.map((g, k) => run.surfaces.some(s => s.body === k));
     this.first = run.frame.length ? run.frame.find(f => f.slice(0, 7 * this.bodies.length).every(Number.isFinite)) || run.frame[0] : null;
@@ -30,7 +30,7 @@ class Model {
 
   /* ---- places ---- */
 
-  /* Coordinates are shown from the first body: single precision, in which graphics work, would shake far from the origin. */
+  /* Coordinates are drawn relative to the first body: graphics use single precision, in which positions far from the origin would jitter. */
   findOrigin() {
     const b = this.bodies.length && this.first ? this.first : null;
     this.origin = b ? [b[0], b[1], b[2]] : [0, 0, 0];
@@ -51,7 +51,7 @@ class Model {
     return Number.isFinite(position.x + position.y + position.z + rotation.x + rotation.y + rotation.z + rotation.w);
   }
 
-  /* The frame of an attachment goes along with the surface of its body, whose displacements are scaled. */
+  /* Scales the displacement of an attachment's frame by the same factor as those of its body's surface. */
   scaleDeflection(tracks, frame, position) {
     const rest = this.pointAt(tracks, [frame.carrier, ...frame.rest]);
     position.sub(rest).multiplyScalar(this.deflection).add(rest);
@@ -63,10 +63,11 @@ class Model {
     return to.set(place[1], place[2], place[3]).applyQuaternion(rotation).add(position);
   }
 
-  /* Whether it is the frame of an attachment to a body whose surface is drawn */
+  /* Whether the body is the frame of an attachment of a flexible body whose surface is drawn */
   onSurface(body) { return body >= 0 && !!this.hasSurface[this.run.scene.bodies[body].carrier]; }
 
-  /* Places of markers that joints, forces and lines use: all of them, and by body; frames of attachments by flexible body */
+  /* Collects the places of markers of joints, forces and lines (places), those on each body (placesOf), and the frames of
+     attachments of each flexible body */
   findPlaces() {
     this.places = [];
     for (const e of this.run.scene.elements) for (const p of [e.i, e.j]) if (p) this.places.push(p);
@@ -113,7 +114,7 @@ class Model {
     return mesh;
   }
 
-  /* The farthest marker from the centre of mass, by which shapes guessed from the inertia are kept in bounds */
+  /* Distance of the farthest marker from the centre of mass, which limits the size of shapes derived from the inertia */
   reachOf(body) {
     let reach = 0;
     for (const p of this.placesOf[body]) reach = Math.max(reach, Math.hypot(p[1], p[2], p[3]));
@@ -140,7 +141,7 @@ class Model {
     draw(this.ground, this.run.scene.ground, this.material(this.colourOf(-1)), false, 1);
   }
 
-  /* Bars from the centre of mass to the markers of a body of unknown shape; of a flexible one to its attachments, which move with its modes */
+  /* Adds bars from the centre of mass to the markers of a body of unknown shape; for a flexible body to its attachments, which move with its modes */
   addBars(b, k, reach) {
     const radius = 0.006 * this.size, seen = new Set();
     if (!b.shapes.length && !b.modes) this.mesh(this.bodies[k], once('dot', () => new THREE.SphereBufferGeometry(0.014 * this.size, 24, 16)), this.materials[k]);
@@ -153,7 +154,7 @@ class Model {
     for (const c of this.framesOf[k]) this.addSpan([k, 0, 0, 0], [c, 0, 0, 0], rod(radius), this.materials[k], k);
   }
 
-  /* Geometry of length one along y; within one body it is placed once */
+  /* Adds a mesh from place a to place b; its geometry has length one along y. If both places are on one body, the mesh is fixed to that body */
   addSpan(a, b, geometry, material, body) {
     const fixed = a[0] === b[0], parent = !fixed ? this.scene3 : a[0] < 0 ? this.ground : this.bodies[a[0]];
     const mesh = this.mesh(parent, geometry, material);
@@ -184,13 +185,15 @@ class Model {
 
   addElements() {
     const s = 0.012 * this.size, metal = this.material('#5b6472'), spring = this.material('#7d8898'), joint = this.material('#4a5361');
-    const hidden = new THREE.MeshBasicMaterial({color: 0xffffff, transparent: true, opacity: 0.13, depthTest: false}); /* seen through what covers it */
-    const few = this.run.scene.elements.length < 200; /* many on top of each other would cover all else */
+    /* also visible behind other objects */
+    const hidden = new THREE.MeshBasicMaterial({color: 0xffffff, transparent: true, opacity: 0.13, depthTest: false});
+    const few = this.run.scene.elements.length < 200; /* many overlapping ones would hide everything else */
     for (const e of this.run.scene.elements) {
       if (!e.i) continue;
       const geometry = e.kind === 'joint' ? jointGeometry(e.type, s) : null;
       if (geometry) {
-        const place = e.j && this.onSurface(e.j[0]) && !this.onSurface(e.i[0]) ? e.j : e.i; /* scaled deflections take the joint away from the other body */
+        /* on the surface, whose scaled deflections would otherwise separate it from the joint */
+        const place = e.j && this.onSurface(e.j[0]) && !this.onSurface(e.i[0]) ? e.j : e.i;
         const mesh = this.mesh(place[0] < 0 ? this.ground : this.bodies[place[0]], geometry, joint, place);
         mesh.userData.element = `${e.name} (${e.type})`;
         if (few) {
@@ -220,14 +223,14 @@ class Model {
       geometry.setIndex(new THREE.BufferAttribute(index, 1));
       const material = this.material(this.colourOf(s.body), {side: THREE.DoubleSide, vertexColors: THREE.VertexColors});
       s.mesh = this.mesh(this.bodies[s.body], geometry, material);
-      s.mesh.frustumCulled = false; /* its bounds change */
+      s.mesh.frustumCulled = false; /* its bounding volume changes with the deformation */
       s.active = s.mode.map((m, k) => k).filter(k => s.mode[k].largest > 0);
     }
     this.addScales();
     this.colourBy = this.scales.length ? 'stress' : 'body';
   }
 
-  /* Surfaces whose stress has the same unit share a scale of colours. */
+  /* Makes the colour scales; surfaces whose stress has the same unit share one. */
   addScales() {
     this.scales = [];
     for (const s of this.run.surfaces) {
@@ -241,8 +244,8 @@ class Model {
     }
   }
 
-  /* Largest stress of the run, and what all but one in a hundred of the nodes stay below: the colours end there, for a few nodes at
-     attachments would leave all others in one colour. */
+  /* The largest stress of the run, and the stress that 99 % of the nodes never exceed. The colours end at the latter,
+     since high values at a few nodes near attachments would give all other nodes the same colour. */
   stressRange(s) {
     const most = new Float32Array(s.nodes);
     for (const f of s.field) for (let i = 0; i < s.nodes; i++) if (f.code[i] === 255) most[i] = Math.max(most[i], f.largest[i]);
@@ -252,7 +255,7 @@ class Model {
 
   /* ---- motion ---- */
 
-  /* deflection: factor on the displacements of surfaces and attachments */
+  /* Moves everything to time t; deflection: factor of the displacements of surfaces and attachments */
   moveTo(t, deflection) {
     const tracks = framesAt(this.run, t);
     if (!tracks) return;
@@ -274,7 +277,7 @@ class Model {
     }
   }
 
-  /* Nodes that move by themselves */
+  /* Adds displacements of nodes that move individually */
   addMotion(s, x, t) {
     const [k, part] = placeInTime(this.run, t), a = s.motion[k], b = s.motion[Math.min(k + 1, s.motion.length - 1)];
     if (!a) return;
@@ -294,7 +297,8 @@ class Model {
       to[3 * v + 2] = x[i + 2];
     }
     position.needsUpdate = true;
-    if (!s.lit || s.triangle.length < 60000) s.mesh.geometry.computeVertexNormals(); /* of large meshes once: they turn little */
+    /* normals of large meshes are computed only once, since they change little */
+    if (!s.lit || s.triangle.length < 60000) s.mesh.geometry.computeVertexNormals();
     s.lit = true;
   }
 
@@ -318,8 +322,9 @@ class Model {
     s.painted = by;
   }
 
-  /* The box around everything at some times of the run, and of all corners those that are outermost in some direction, spread evenly over the sphere:
-     within 2 % of where a camera has to look, for however many bodies */
+  /* Finds the box around everything at some times of the run, and, for 100 directions spread evenly over the sphere, the
+     outermost corner of any body: these points determine the view of a camera to 2 %, independently of the number of
+     bodies */
   findBounds() {
     const n = this.run.frame.length, some = Math.min(n, 24), corner = new THREE.Vector3(), outermost = [];
     for (let k = 0; k < 100; k++) {
@@ -361,7 +366,7 @@ class Model {
     return true;
   }
 
-  /* How far displacements may be scaled: until the largest of the run is a third of the scene's size */
+  /* The largest factor of displacements: it makes the largest displacement of the run a third of the scene's size */
   largestDeflection() {
     let most = 0;
     for (const s of this.run.surfaces) {

@@ -1,4 +1,4 @@
-/* Camera, ground grid, lights, picking: how the model is looked at. */
+/* The view of the model: camera, ground grid, lights, picking. */
 
 class View {
   constructor(model, canvas, changed) {
@@ -11,14 +11,14 @@ class View {
     this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
     this.up = new THREE.Vector3(...model.run.scene.up);
     this.camera.up.copy(this.up);
-    this.camera.add(new THREE.DirectionalLight(0xffffff, 0.22)); /* no side that is looked at is black */
+    this.camera.add(new THREE.DirectionalLight(0xffffff, 0.22)); /* moves with the camera, so that no visible side is black */
     model.scene3.add(this.camera);
     this.controls = new THREE.OrbitControls(this.camera, canvas);
     this.controls.enableKeys = false;
     this.controls.screenSpacePanning = true;
     this.controls.addEventListener('change', changed);
     this.controls.addEventListener('start', () => { this.fitted = false; });
-    if (window.self !== window.top) { /* inside another page the wheel scrolls that page until the view has been touched */
+    if (window.self !== window.top) { /* embedded in another page: the wheel scrolls that page until the user has clicked into the view */
       this.controls.enableZoom = false;
       canvas.addEventListener('pointerdown', () => { this.controls.enableZoom = true; });
     }
@@ -26,7 +26,7 @@ class View {
     this.direction = this.chooseDirection();
   }
 
-  /* Two directions across `up`, the first one along x as far as it goes */
+  /* Two horizontal directions, normal to `up`; the first is the projection of x, or of y if `up` is nearly along x */
   horizontal() {
     const along = Math.abs(this.up.x) < 0.9 ? new THREE.Vector3(1, 0, 0) : new THREE.Vector3(0, 1, 0);
     along.addScaledVector(this.up, -along.dot(this.up)).normalize();
@@ -38,7 +38,7 @@ class View {
     return d => Math.abs(d.x) * size.x + Math.abs(d.y) * size.y + Math.abs(d.z) * size.z;
   }
 
-  /* From where the motion is seen widest, a little from the side and from above */
+  /* The direction from which the motion appears widest, a little from the side and from above */
   chooseDirection() {
     if (this.model.run.scene.planar) return new THREE.Vector3(0, 0, 1);
     const [a, b] = this.horizontal(), extent = this.extents(), across = extent(b) <= extent(a);
@@ -52,7 +52,7 @@ class View {
     const extent = this.extents(), centre = bounds.getCenter(new THREE.Vector3()), wide = Math.max(extent(a), extent(b), 0.4 * extent(normal));
     this.gridStep = roundStep(wide, 8);
     const half = this.gridStep * Math.ceil(0.8 * wide / this.gridStep), low = centre.dot(normal) - 0.5 * extent(normal) - 0.004 * this.model.size;
-    /* lines at multiples of the step from the origin of the scene */
+    /* grid lines are at multiples of the step from the origin of the scene */
     const offset = new THREE.Vector3(...this.model.origin), step = this.gridStep, round = d => Math.round((centre.dot(d) + offset.dot(d)) / step) * step - offset.dot(d);
     const middle = a.clone().multiplyScalar(round(a)).addScaledVector(b, round(b)).addScaledVector(normal, low);
     const point = [], n = Math.round(half / step);
@@ -96,7 +96,7 @@ class View {
     this.camera.updateProjectionMatrix();
   }
 
-  /* All of the motion in the middle of the picture. free: part of its height that labels cover at the top. */
+  /* Fits the view to the whole motion. free: fraction of the height of the view that labels cover at the top. */
   fit(free = 0) {
     const {bounds, points} = this.model, direction = this.direction, right = this.up.clone().cross(direction);
     if (right.length() < 1e-6) right.set(1, 0, 0);
@@ -104,7 +104,7 @@ class View {
     const above = direction.clone().cross(right), tall = Math.tan(this.camera.fov * Math.PI / 360), wide = tall * this.camera.aspect;
     const target = bounds.getCenter(new THREE.Vector3()), d = new THREE.Vector3();
     let distance = 0;
-    for (let pass = 0; pass < 4; pass++) { /* from the distance follows the middle, and from that a smaller distance */
+    for (let pass = 0; pass < 4; pass++) { /* alternately computes the distance and the centre, which allows a smaller distance */
       distance = 0;
       for (const p of points) {
         d.copy(p).sub(target);
@@ -130,7 +130,8 @@ class View {
     this.fitted = true;
   }
 
-  /* Turns the camera around the middle of the picture: about the axis upwards, and towards that axis or away from it, short of its ends */
+  /* Rotates the camera around the centre of the view: by `about` about the vertical axis, and by `away` from that axis,
+     so that it does not reach the axis */
   turn(about, away) {
     const d = this.camera.position.clone().sub(this.controls.target).applyAxisAngle(this.up, about), angle = d.angleTo(this.up);
     d.applyAxisAngle(this.up.clone().cross(d).normalize(), Math.min(3.1, Math.max(0.04, angle + away)) - angle);
@@ -139,7 +140,7 @@ class View {
     this.controls.update();
   }
 
-  /* The camera goes along with a body */
+  /* Moves the camera with a body */
   follow(body) {
     const g = this.model.bodies[body];
     if (!g || !g.visible) return;
@@ -154,7 +155,7 @@ class View {
     this.followedAt = g.position.clone();
   }
 
-  /* What is under a point of the page: {body, element (its name and type), object, surface, node} or null */
+  /* The object at a point of the page: {body, element (its name and type), object, surface, node}, or null */
   pick(x, y) {
     const box = this.canvas.getBoundingClientRect(), ray = new THREE.Raycaster();
     ray.setFromCamera(new THREE.Vector2(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height), this.camera);
@@ -179,7 +180,7 @@ class View {
     return best;
   }
 
-  /* Where a point of the scene is on the canvas, CSS pixels; null behind the camera */
+  /* The position of a point of the scene on the canvas, in CSS pixels; null if the point is behind the camera */
   project(point) {
     const p = point.clone().project(this.camera);
     return p.z > 1 ? null : [(p.x + 1) / 2 * this.canvas.clientWidth, (1 - p.y) / 2 * this.canvas.clientHeight];
@@ -187,7 +188,7 @@ class View {
 
   draw() { this.renderer.render(this.model.scene3, this.camera); }
 
-  /* The axes of space, as the camera sees them, in a corner */
+  /* Draws the axes of space, in the orientation of the camera, in a corner */
   drawAxes(canvas) {
     const g = canvas.getContext('2d'), middle = canvas.width / 2, inverse = this.camera.quaternion.clone().conjugate();
     g.clearRect(0, 0, canvas.width, canvas.height);

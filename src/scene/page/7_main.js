@@ -1,4 +1,4 @@
-/* What the reader of the page does: time, selection, plots, lists, keys. */
+/* The user interface of the page: time, selection, plots, lists, keys. */
 
 const element = id => document.getElementById(id);
 const mostPlots = 4;
@@ -16,7 +16,7 @@ function say(text, bad) {
 
 const begin = () => run.time[0] || 0, end = () => run.time[run.time.length - 1] || 0;
 
-/* 1, 2 or 5 times powers of ten: the run as it is, if that takes 2 to 30 seconds, else what takes about eight */
+/* The default speed: 1 if the run then takes 2 to 30 seconds, else 1, 2 or 5 times a power of ten, so that it takes about eight */
 function naturalSpeed() {
   const length = end() - begin();
   return !(length > 0) || (length >= 2 && length <= 30) ? 1 : roundStep(length / 8, 1);
@@ -51,7 +51,7 @@ function goFrames(n) {
   go(run.time[Math.min(run.time.length - 1, Math.max(0, from + n))]);
 }
 
-/* ---- drawing, when something has changed ---- */
+/* ---- drawing, only when something has changed ---- */
 
 let asked = false, nextPicture = f => requestAnimationFrame(f);
 function wake() {
@@ -97,7 +97,7 @@ function draw() {
   for (const p of [...bodyPlots, ...plots]) p.draw(state.t, place);
 }
 
-/* The name of what is selected, beside it */
+/* Shows the name of the selected object beside it */
 function showTag() {
   const tag = element('tag'), group = model.bodies[state.body];
   let text = group ? run.scene.bodies[state.body].name : '', at = group && group.visible ? group.position : null;
@@ -117,7 +117,7 @@ function showTag() {
 
 /* ---- selection and plots ---- */
 
-/* A body, a node of its surface, or a joint or force at it: what View.pick() returns */
+/* Selects a body, a node of its surface, or a joint or force at it; picked: the result of View.pick() */
 function select(body, node = null, picked = null) {
   if (model && view) {
     model.materials.forEach((m, k) => m.emissive.set(k === body ? 0x333333 : 0));
@@ -161,7 +161,7 @@ function showPlots() {
   change();
 }
 
-/* A list of buttons with a field to search in where it is long */
+/* Adds a list of buttons, with a search field if it is long */
 function addList(title, entries, open) {
   if (!entries.length) return;
   const box = document.createElement('details'), head = document.createElement('summary'), list = document.createElement('ul');
@@ -211,7 +211,7 @@ function addLists() {
 
 /* ---- surfaces ---- */
 
-/* The slider is logarithmic, from 1 to the largest sensible factor */
+/* Sets the factor of deflections from the slider, which is logarithmic, from 1 to the largest useful factor */
 function setDeflection() {
   const x = 10 ** (element('deflection').value / 100 * Math.log10(usable));
   state.deflection = Number(x.toPrecision(x < 10 ? 2 : 1));
@@ -239,7 +239,7 @@ function prepareSurfaces() {
   setColour('stress');
 }
 
-/* Of one scale of colours; where there are several, with the names of its bodies */
+/* The legend of a colour scale; if there are several scales, with the names of the bodies of each */
 function legendOf(scale) {
   const legend = document.createElement('div'), colours = stressStops.map(([x, colour]) => `${colour} ${100 * x}%`);
   legend.innerHTML = '<div class="name">von Mises</div><div class="bar"><div class="colours"></div><div class="ticks"></div></div>';
@@ -265,7 +265,7 @@ function setTheme(theme) {
 function prepareTheme() {
   const system = window.matchMedia('(prefers-color-scheme: dark)');
   let chosen = null;
-  try { chosen = localStorage.getItem('hhtdae-theme'); } catch (e) { /* no storage for files, in some browsers */ }
+  try { chosen = localStorage.getItem('hhtdae-theme'); } catch (e) { /* some browsers have no storage for local files */ }
   setTheme(chosen || (system.matches ? 'dark' : 'light'));
   system.addEventListener('change', () => { if (!chosen) setTheme(system.matches ? 'dark' : 'light'); });
   return () => {
@@ -279,7 +279,7 @@ function prepareTheme() {
 
 function press(id, on) { element(id).setAttribute('aria-pressed', String(on)); }
 
-/* Labels at the top of a narrow view must not lie over the model. */
+/* Fits the view; in a narrow view the labels at the top must not cover the model. */
 function fit() {
   if (!view) return;
   view.resize();
@@ -319,9 +319,9 @@ const keys = {
 
 function onKey(e) {
   if (e.ctrlKey || e.metaKey || e.altKey || element('about').open || /^(INPUT|SELECT)$/.test(e.target.tagName) && e.target.type !== 'range') return;
-  if (e.key === ' ' && e.target.tagName === 'BUTTON' || e.target.tagName === 'SUMMARY') return; /* the button's own key */
+  if (e.key === ' ' && e.target.tagName === 'BUTTON' || e.target.tagName === 'SUMMARY') return; /* the space bar activates the button */
   if (e.target.id === 'deflection' && /^(Arrow|Home|End)/.test(e.key)) return;
-  if (e.target.closest('aside') && /^(ArrowUp|ArrowDown|Home|End)$/.test(e.key)) return; /* scrolls the lists */
+  if (e.target.closest('aside') && /^(ArrowUp|ArrowDown|Home|End)$/.test(e.key)) return; /* these keys scroll the lists */
   const action = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
   if (!action) return;
   e.preventDefault();
@@ -337,7 +337,7 @@ function prepareControls() {
   new ResizeObserver(change).observe(element('plots'));
   if (!view) return;
   let down = null;
-  element('canvas').addEventListener('pointerdown', e => { down = e.isPrimary ? [e.clientX, e.clientY] : null; }); // a second finger turns the touch into a pinch
+  element('canvas').addEventListener('pointerdown', e => { down = e.isPrimary ? [e.clientX, e.clientY] : null; }); // a second finger: pinch
   element('canvas').addEventListener('pointercancel', () => { down = null; });
   element('canvas').addEventListener('pointerup', e => {
     if (!down || Math.hypot(e.clientX - down[0], e.clientY - down[1]) > 5 || e.button) return;
@@ -346,13 +346,13 @@ function prepareControls() {
   });
 }
 
-/* ---- the page's test of itself, with #selftest behind its address ---- */
+/* ---- self-test of the page, with #selftest appended to its address ---- */
 
 const frames = n => new Promise(done => { const next = () => n-- > 0 ? nextPicture(next) : done(); next(); });
 
-/* Goes through the run, plays, selects; leaves what it found in an attribute of the document */
+/* Steps through the run, plays it, selects objects; writes the results to an attribute of the document */
 async function testSelf() {
-  nextPicture = f => setTimeout(() => f(performance.now()), 16); /* a browser without a screen may draw no pictures by itself */
+  nextPicture = f => setTimeout(() => f(performance.now()), 16); /* a browser without a screen may not call requestAnimationFrame() callbacks */
   const result = {frames: run.time.length, bodies: run.scene.bodies.length, channels: run.scene.channels.length, surfaces: run.surfaces.length, webgl: !!view};
   const n = run.time.length;
   for (let k = 0; k < n; k += Math.max(1, Math.floor(n / 12))) {
@@ -376,7 +376,7 @@ async function testSelf() {
   scrubTo(begin());
   play(true);
   const from = state.t;
-  for (let waited = 0; waited < 100 && !(state.t > from); waited++) await frames(1); // on a busy machine no time passes in the first ones
+  for (let waited = 0; waited < 100 && !(state.t > from); waited++) await frames(1); // time may not advance in the first frames
   result.played = state.t > from;
   play(false);
   result.plots = document.querySelectorAll('.plot').length;
@@ -386,7 +386,7 @@ async function testSelf() {
 
 /* ---- start ---- */
 
-/* Settings behind the address, for pictures: #time=0.5&theme=dark&body=2&deflection=60&play */
+/* Applies settings appended to the address, for making pictures: #time=0.5&theme=dark&body=2&deflection=60&play */
 function applyAddress() {
   const set = new URLSearchParams(location.hash.slice(1));
   if (set.has('theme')) setTheme(set.get('theme') === 'dark' ? 'dark' : 'light');
@@ -441,4 +441,4 @@ async function start() {
   }
 }
 
-document.addEventListener('DOMContentLoaded', start); /* the data stand behind this program */
+document.addEventListener('DOMContentLoaded', start); /* the data follow this program in the page */
