@@ -10,10 +10,11 @@ namespace python
 namespace
 {
 
-/* The exception that a Python function has left in the midst of PETSc; one thread at a time holds Python's lock */
+/* The exception of a Python function that PETSc has called, until Check() raises it. One variable suffices, since one
+   thread at a time holds Python's lock */
 PyObject *pending_ = nullptr;
 
-/* petsc4py's table of C functions, which each shared object has to fetch once */
+/* Imports petsc4py's table of C functions; each shared object must do this once */
 void Petsc4Py()
 {
   static bool done = false;
@@ -42,7 +43,7 @@ template <class T> T Get(py::handle x, T (*get)(PyObject *))
 
 void Check(PetscErrorCode code)
 {
-  if (code == 0) { /* an exception that PETSc has got over is the cause of nothing later */
+  if (code == 0) { /* PETSc has recovered from the error; the stored exception must not become the cause of a later one */
     Py_CLEAR(pending_);
     return;
   }
@@ -74,7 +75,8 @@ Array ToArray(py::handle x, const std::string &what)
   try {
     return Array(py::reinterpret_borrow<py::object>(x));
   } catch (py::error_already_set &e) {
-    if (!e.matches(PyExc_TypeError) && !e.matches(PyExc_ValueError)) throw; /* Ctrl-C comes while NumPy reads a list, too */
+    /* other exceptions, such as KeyboardInterrupt, can also occur while NumPy reads a list */
+    if (!e.matches(PyExc_TypeError) && !e.matches(PyExc_ValueError)) throw;
   }
   throw py::type_error(what + " must be numbers, is " + py::repr(x).cast<std::string>());
 }

@@ -1,4 +1,4 @@
-/* What the sources of the Python module share: PETSc's objects and small arrays in and out, errors as Python exceptions. */
+/* Common part of the sources of the Python module: conversion of PETSc's objects and small arrays, errors as Python exceptions. */
 #ifndef HHTDAE_PYTHON_BIND_H
 #define HHTDAE_PYTHON_BIND_H
 
@@ -16,10 +16,11 @@ namespace python
 
 namespace py = pybind11;
 
-/* An error of PETSc becomes hhtdae.Error with the message of its origin. An exception that a Python function has left behind goes on. */
+/* Raises hhtdae.Error, with the message of the innermost error, if code is an error of PETSc. The pending exception of a
+   Python function, Call(), becomes its cause. */
 void Check(PetscErrorCode code);
 
-/* petsc4py's objects: borrowed, and new ones which share ownership */
+/* Conversion from petsc4py's objects (borrowed references), and to new ones that share ownership */
 TS         ToTS(py::handle x);
 Vec        ToVec(py::handle x);
 Mat        ToMat(py::handle x);
@@ -30,7 +31,7 @@ py::object FromVec(Vec x);
 py::object FromMat(Mat x);
 py::object FromIS(IS x);
 
-/* A plain value, `wanted` in words; `what` is named where it is another one */
+/* Converts x to a plain value. The error message names `what` and describes the required type, `wanted` */
 template <class T> T To(py::handle x, const std::string &what, const char *wanted)
 {
   try {
@@ -40,7 +41,7 @@ template <class T> T To(py::handle x, const std::string &what, const char *wante
   }
 }
 
-/* Arrays of one or two dimensions; `what` is named where the shape is wrong */
+/* Arrays of one or two dimensions; the error message for a wrong shape names `what` */
 using Array = py::array_t<double, py::array::c_style | py::array::forcecast>;
 Array           ToArray(py::handle x, const std::string &what);
 Vector3         ToVector(py::handle x, const std::string &what);
@@ -54,12 +55,12 @@ template <class M> py::array FromMatrix(const M &x)
 }
 inline py::array FromVector(const Vector3 &x) { return FromDoubles(x.data(), {3}); }
 
-/* Calls a Python function from inside of PETSc: an exception is kept for Check(), which makes it the cause of hhtdae.Error, and goes
-   on as a std::runtime_error with its text. */
+/* Calls a Python function from a callback of PETSc. An exception is stored for Check(), which makes it the cause of
+   hhtdae.Error, and a std::runtime_error with its text is thrown. */
 py::object Call(py::handle f, const py::tuple &arguments);
-/* Keeps Python's present exception like Call() */
+/* Stores Python's present exception and throws as Call() does */
 [[noreturn]] void Keep();
-/* What C++ calls back by more than Call(): exceptions of conversions are kept, too */
+/* For callbacks from C++ that do more than Call(): also stores exceptions of conversions */
 template <class F> auto Keeping(F f) -> decltype(f())
 {
   try {
@@ -69,9 +70,9 @@ template <class F> auto Keeping(F f) -> decltype(f())
   }
   Keep();
 }
-/* Raises the exception that Call() has kept, if there is one */
+/* Raises the exception that Call() has stored, if there is one */
 void PassOn();
-/* What Python calls without PETSc between: an exception of a function within goes on as it is */
+/* For calls from Python without PETSc in between: an exception of a Python function called within is raised unchanged */
 template <class F> auto Directly(F f)
 {
   try {
@@ -81,7 +82,7 @@ template <class F> auto Directly(F f)
     throw;
   }
 }
-/* The same as Call() at the border to C: an error of PETSc */
+/* For callbacks that PETSc calls: exceptions are stored as by Call(), and an error code of PETSc is returned */
 template <class F> PetscErrorCode Guarded(F f)
 {
   py::gil_scoped_acquire gil;
@@ -94,10 +95,10 @@ template <class F> PetscErrorCode Guarded(F f)
   PetscFunctionReturn(0);
 }
 
-/* An exception of a signal's handler, Ctrl-C as a rule, as an error of PETSc */
+/* Runs Python's signal handlers; an exception of one, usually KeyboardInterrupt, becomes an error of PETSc */
 PetscErrorCode CheckSignals();
 
-/* What PETSC_VERSION changes: how a container's contents are destroyed */
+/* Attaches `contents` to a PETSc object, which then destroys them; how a container does this depends on PETSC_VERSION */
 template <class T> PetscErrorCode OwnedBy(PetscObject owner, const char name[], T *contents)
 {
   PetscContainer box;
@@ -114,7 +115,7 @@ template <class T> PetscErrorCode OwnedBy(PetscObject owner, const char name[], 
   PetscFunctionReturn(0);
 }
 
-/* The parts of the module */
+/* Each adds a part of the module */
 void BindIntegrator(py::module_ &m);
 void BindCallbacks(py::module_ &m);
 void BindFunctions(py::module_ &m);

@@ -1,4 +1,5 @@
-/* Functions of the integrator that call the application's: longest step, names of rows, change of coordinates, rotations. The TS owns the Python functions. */
+/* Callbacks of the integrator implemented by Python functions: longest step, names of rows, change of coordinates,
+   rotations. The TS owns the Python functions. */
 #include "bind.h"
 #include "../scene/guard.h"
 #include "hhtdae/hhtdae.h"
@@ -11,7 +12,7 @@ namespace python
 namespace
 {
 
-/* Python functions that belong to a TS */
+/* Python functions that a TS owns */
 struct Functions {
   std::vector<py::object> f;
   ~Functions()

@@ -1,9 +1,9 @@
 /*
-  Elements of a scene from Python's dictionaries of their fields, and back: each kind lists its fields once, in
+  Conversion between elements of a scene and Python's dictionaries of their fields. Each kind lists its fields once, in
 
     template <class F> void Fields(SpringDamper &s, F &f) { f("i", s.i); f("stiffness", s.stiffness); ... }
 
-  which Reader fills from a dictionary and Writer writes into one: what Python's classes are tested against.
+  Reader sets the fields from a dictionary. Writer writes them to a dictionary, with which tests compare Python's classes.
 */
 #ifndef HHTDAE_PYTHON_FIELDS_H
 #define HHTDAE_PYTHON_FIELDS_H
@@ -46,7 +46,8 @@ private:
   static void read(py::handle g, PetscInt64 &x, const std::string &w) { x = To<PetscInt64>(g, w, "a whole number"); }
   static void read(py::handle g, bool &x, const std::string &w)
   {
-    if (!py::isinstance<py::bool_>(g) && std::string(py::str(py::type::of(g).attr("__name__"))).rfind("bool", 0) != 0) /* numpy's too; a number is one that stands in the wrong place */
+    /* NumPy's bool is accepted, too; a number indicates that arguments were confused */
+    if (!py::isinstance<py::bool_>(g) && std::string(py::str(py::type::of(g).attr("__name__"))).rfind("bool", 0) != 0)
       throw py::type_error(w + " must be True or False, not " + std::string(py::repr(g)));
     x = g.cast<bool>();
   }
@@ -89,7 +90,7 @@ private:
   }
 };
 
-/* The defaults of a kind; what has no plain value is None */
+/* Writes the default values of a kind; None for a field whose value is not a plain one */
 class Writer
 {
 public:
@@ -109,10 +110,11 @@ public:
   template <class T> void operator()(const char *name, T &) { fields[name] = py::none(); }
 };
 
-/* What Python's Scene.add() does for a kind of element */
+/* The functions that Python's Scene.add() uses for a kind of element */
 struct Kind {
   std::function<Element(Scene &, const std::string &name, const py::dict &fields)>   add;
-  std::function<Element(Scene &, const std::string &name, py::handle describe)>      again; /* describe() gives the fields, or None: absent */
+  /* describe() returns the fields, or None if the element is absent; it is called anew when parameters have changed */
+  std::function<Element(Scene &, const std::string &name, py::handle describe)>      again;
   std::function<py::dict()>                                                          defaults;
 };
 using Kinds = std::map<std::string, Kind>;
@@ -125,7 +127,8 @@ template <class Spec> Spec Read(const py::dict &fields, const std::string &kind,
   return s;
 }
 
-/* A description that has been called, whose result is that of its first call: an exception of it comes before the scene has noted a part that is not there */
+/* Calls a description at once; the returned function gives this result the first time. So an exception is raised before
+   the scene has recorded an incomplete part */
 template <class F> auto Called(F read)
 {
   using Part          = decltype(read());

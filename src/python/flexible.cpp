@@ -1,4 +1,4 @@
-/* The extension module hhtdae._flexible: FE models, reduction, stress. Apart from _core, so that rigid scenes load no SLEPc. */
+/* The extension module hhtdae._flexible: FE models, reduction, stress. It is separate from _core, so that rigid scenes do not load SLEPc. */
 #include "bind.h"
 #include "hhtdae/flexible.h"
 #include "hhtdae/modes.h"
@@ -40,7 +40,7 @@ Attachment ToAttachment(py::handle x)
   return a;
 }
 
-/* (name, set, follows), or (name, {label: force}) */
+/* Converts the tuple (name, set, follows), or (name, {label: force}) */
 LoadCase ToLoad(py::handle x)
 {
   const py::tuple t = py::reinterpret_borrow<py::tuple>(x);
@@ -91,7 +91,7 @@ py::array Out(const std::vector<double> &x, py::ssize_t width)
   return width == 1 ? FromDoubles(x.data(), {(py::ssize_t)x.size()}) : FromDoubles(x.data(), {(py::ssize_t)x.size() / width, width});
 }
 
-/* Type, material and nodes of elements, node numbers padded with -1 */
+/* The tuple (types, materials, nodes) of elements; node numbers are padded with -1 */
 py::tuple Elements(const std::vector<FeElement> &all)
 {
   static const char *const names[] = {"tetrahedron4", "tetrahedron10", "brick8", "brick20"};
@@ -244,7 +244,7 @@ void BindFull(py::module_ &m)
 
 PYBIND11_MODULE(_flexible, m)
 {
-  pybind11::module_::import("hhtdae._core"); /* its types */
+  pybind11::module_::import("hhtdae._core"); /* registers the types that _flexible uses */
   hhtdae::python::BindModel(m);
   hhtdae::python::BindReduced(m);
   hhtdae::python::BindFull(m);

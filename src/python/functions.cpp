@@ -41,7 +41,7 @@ py::array EvaluateTape(const Tape &tape, Array x)
   return FromDoubles(out.data(), {(py::ssize_t)out.size()});
 }
 
-/* Value and derivatives by the arguments of the first output */
+/* The value of the first output and its derivatives by the arguments */
 py::tuple DifferentiateTape(const Tape &tape, Array x)
 {
   const int         n = tape.arguments;
@@ -86,7 +86,7 @@ Measure ToMeasure(py::handle x)
   m.j         = ToHandle<Marker>(t[2], kind + ": marker j");
   m.frame     = ToHandle<Marker>(t[3], kind + ": frame");
   m.component = t[4].cast<int>();
-  const Element target = ToHandle<Element>(t[5], kind + ": target", true); /* Python has looked at its kind */
+  const Element target = ToHandle<Element>(t[5], kind + ": target", true); /* Python has checked the kind of the target */
   m.target             = target.id;
   m.scene              = target.scene;
   return m;

@@ -1,4 +1,4 @@
-/* Readers of what Python describes: fields of elements, measures, expressions. */
+/* Converts descriptions from Python: handles, measures, expressions. */
 #ifndef HHTDAE_PYTHON_FUNCTIONS_H
 #define HHTDAE_PYTHON_FUNCTIONS_H
 
@@ -16,7 +16,8 @@ template <> inline const char *const kind_of<Body>    = "body";
 template <> inline const char *const kind_of<Marker>  = "marker";
 template <> inline const char *const kind_of<Element> = "element";
 
-/* Handles are objects with the attributes `_id`, `_number` and `_kind`; None is no handle. A body is no marker, though both have numbers. */
+/* Converts a handle, a Python object with the attributes `_id`, `_number` and `_kind`; None gives an empty handle. The
+   kind is checked, since bodies and markers both have numbers. */
 template <class H> H ToHandle(py::handle x, const std::string &what, bool any_kind = false)
 {
   H h;
@@ -29,9 +30,9 @@ template <class H> H ToHandle(py::handle x, const std::string &what, bool any_ki
   return h;
 }
 
-/* A measure's tuple: kind, i, j, frame, component, target */
+/* Converts the tuple (kind, i, j, frame, component, target) of a measure */
 Measure ToMeasure(py::handle x);
-/* An expression's tuple: measures, tape or None for the measure itself */
+/* Converts the tuple (measures, tape) of an expression; the tape is None if the expression is a single measure */
 Expression   ToExpression(py::handle x);
 TimeFunction ToTimeFunction(py::handle x);
 

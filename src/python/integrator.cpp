@@ -10,7 +10,7 @@ namespace python
 namespace
 {
 
-/* Index of a name in one of PETSc's lists of names of an enumeration */
+/* The index of a name in one of PETSc's lists of names of an enumeration; an error that lists the names if it is not among them */
 int Choice(const char *const *names, int count, const std::string &given, const char *what)
 {
   std::string known;
@@ -34,7 +34,7 @@ py::dict Statistics(py::object ts)
                   "h_min"_a = s.h_min, "h_max"_a = s.h_max, "of_order"_a = py::make_tuple(s.of_order[2], s.of_order[3], s.of_order[4], s.of_order[5]));
 }
 
-/* (U, U', U'') at time t as new vectors, by one of two functions */
+/* (U, U', U'') at time t as new vectors; at: TSHHT3Interpolate() or TSHHT3EvaluateAt() */
 py::tuple StateAt(py::object ts, double t, PetscErrorCode (*at)(TS, PetscReal, Vec, Vec, Vec))
 {
   Vec U, X[3];
@@ -43,13 +43,13 @@ py::tuple StateAt(py::object ts, double t, PetscErrorCode (*at)(TS, PetscReal, V
   for (int k = 0; k < 3; k++) {
     Check(VecDuplicate(U, &X[k]));
     x[k] = FromVec(X[k]);
-    Check(PetscObjectDereference((PetscObject)X[k])); /* x[k] owns it */
+    Check(PetscObjectDereference((PetscObject)X[k])); /* x[k] owns the vector */
   }
   Check(at(ToTS(ts), t, X[0], X[1], X[2]));
   return py::make_tuple(x[0], x[1], x[2]);
 }
 
-/* What the first of the ranks that have failed says, with its number, on all of them; None: none has. Collective. */
+/* The message and number of the first rank that has failed, on all ranks; None if none has failed. Collective. */
 py::object FirstFailure(py::object of, const std::string &mine)
 {
   const MPI_Comm comm = ToComm(of);
@@ -66,7 +66,7 @@ py::object FirstFailure(py::object of, const std::string &mine)
   return py::make_tuple((int)first, text);
 }
 
-/* petsc4py has no TSAdapt. */
+/* TSAdaptSetStepLimits(), since petsc4py does not wrap TSAdapt */
 void SetMaxStep(py::object ts, double h)
 {
   TSAdapt adapt;

@@ -4,7 +4,7 @@
 namespace hhtdae
 {
 
-/* In the namespace of the kinds, where the compiler looks for them */
+/* The functions Fields() must be in the namespace of the kinds for argument-dependent lookup */
 template <class S> using HasPair = std::enable_if_t<sizeof(S) == 2 * sizeof(Marker)>;
 template <class S, class F, class = HasPair<S>> static void Fields(S &s, F &f) { f("i", s.i), f("j", s.j); }
 template <class S, class F> static void Pair(S &s, F &f) { f("i", s.i), f("j", s.j); }

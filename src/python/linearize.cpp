@@ -31,7 +31,7 @@ py::tuple Part(Linearized &l, const Mode &mode, py::object body)
   return py::make_tuple(Out(p.displacement.data(), 3), Out(p.rotation.data(), 3), p.share);
 }
 
-/* (marker, force, moment, element, acceleration of the ground): what an input of 1 is */
+/* Converts the tuple (marker, force, moment, element, acceleration of the ground), the excitation for an input of 1 */
 Excitation ToExcitation(py::handle x)
 {
   const py::tuple t = py::reinterpret_borrow<py::tuple>(x);
@@ -63,7 +63,7 @@ py::tuple States(Linearized &l, py::list in, py::list out)
                         FromDoubles(s.C.data(), {s.outputs, s.states}), FromDoubles(s.D.data(), {s.outputs, s.inputs}));
 }
 
-/* Copies: the library's own go with the linearization */
+/* Copies of M, C and K, since the library destroys its own with the linearization */
 py::tuple Operators(Linearized &l)
 {
   Mat        M[3], copy;
@@ -72,7 +72,7 @@ py::tuple Operators(Linearized &l)
   for (int k = 0; k < 3; k++) {
     Check(MatDuplicate(M[k], MAT_COPY_VALUES, &copy));
     out[k] = FromMat(copy);
-    Check(PetscObjectDereference((PetscObject)copy)); /* out[k] owns it */
+    Check(PetscObjectDereference((PetscObject)copy)); /* out[k] owns the matrix */
   }
   return py::make_tuple(out[0], out[1], out[2]);
 }

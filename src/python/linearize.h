@@ -11,10 +11,10 @@ namespace hhtdae
 namespace python
 {
 
-/* A linearization that can be emptied, before PETSc ends */
+/* A linearization whose contents can be destroyed before PetscFinalize() */
 struct Linearized {
   std::unique_ptr<Linearization> small = std::make_unique<Linearization>();
-  py::object                     ts; /* a reference of its own to the run, which may be closed */
+  py::object                     ts; /* a reference to the run, so that the TS exists even if the run is closed */
 
   Linearization &get()
   {

@@ -1,6 +1,6 @@
 /*
-  Equations of motion that were traced into a tape, as the residual and the Jacobian of a TS: they run without Python. U is (q, lambda), the
-  tape's arguments are t, U, U', U''; its outputs the residual, then the entries of dF/dU, dF/dU', dF/dU'' that are not zero.
+  Residual and Jacobian of a TS for equations of motion that were traced into a tape; they are evaluated without Python. U is (q, lambda). The
+  arguments of the tape are t, U, U', U''; its outputs are the residual, then the nonzero entries of dF/dU, dF/dU', dF/dU''.
 */
 #include "bind.h"
 #include "tape.h"
@@ -17,10 +17,10 @@ namespace
 struct Equations {
   std::shared_ptr<Tape> residual, jacobian;
   PetscInt              n;
-  std::vector<PetscInt> row[3], column[3]; /* of the entries of each of the three matrices */
+  std::vector<PetscInt> row[3], column[3]; /* row and column of the entries of each of the three matrices */
   std::vector<double>   u, out;
 
-  /* t and the three vectors behind one another */
+  /* Concatenates t and the three vectors in u */
   PetscErrorCode gather(PetscReal t, Vec U, Vec V, Vec A)
   {
     const PetscScalar *x;
@@ -36,7 +36,7 @@ struct Equations {
   }
 };
 
-/* The tape may call Python where the user has asked for it, and Python may fail */
+/* Evaluates a tape; it may contain callbacks to Python functions, which may raise exceptions */
 template <class F> PetscErrorCode Safely(F f)
 {
   PetscFunctionBegin;
@@ -81,7 +81,7 @@ PetscErrorCode Jacobian(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, Pets
   PetscFunctionReturn(0);
 }
 
-/* A pattern of all three matrices and of the diagonal, which factorizations want */
+/* Creates J with the nonzeros of all three matrices and of the diagonal, which factorizations require */
 PetscErrorCode Pattern(const Equations &e, Mat *J)
 {
   PetscFunctionBegin;

@@ -1,4 +1,4 @@
-/* The extension module hhtdae._core, below the package's Python sources, which are what users see. */
+/* The extension module hhtdae._core, which the package's Python sources use; it is not part of the public interface. */
 #include "bind.h"
 
 PYBIND11_MODULE(_core, m)

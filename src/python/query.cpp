@@ -11,10 +11,10 @@ namespace python
 namespace
 {
 
-/* A snapshot that can be emptied, before PETSc ends */
+/* A snapshot whose contents can be destroyed before PetscFinalize() */
 struct Held {
   std::unique_ptr<Snapshot> now = std::make_unique<Snapshot>();
-  py::object                ts; /* a reference of its own to the run, which it reads, and which may be closed */
+  py::object                ts; /* a reference to the run that the snapshot reads, so that the TS exists even if the run is closed */
 
   Snapshot &get()
   {

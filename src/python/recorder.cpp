@@ -26,7 +26,7 @@ PetscErrorCode Destroy(void **ctx)
   PetscFunctionReturn(0);
 }
 
-/* The first multiple of dt after t */
+/* The number of the first multiple of dt after t */
 PetscInt64 After(PetscReal t, double dt) { return (PetscInt64)std::floor((t + 1e-12 * std::abs(t)) / dt) + 1; }
 
 } // namespace
@@ -49,7 +49,7 @@ void Recorder::resume(PetscReal t)
   resumed_ = true;
 }
 
-/* Other TS types give values at the ends of steps alone, and begin at once */
+/* For TS types other than TSHHT3, which have states at the ends of steps only; the first sample is taken at once */
 PetscErrorCode Recorder::lookAtEnd(TS ts, PetscInt step, PetscReal t)
 {
   PetscFunctionBegin;
@@ -57,8 +57,9 @@ PetscErrorCode Recorder::lookAtEnd(TS ts, PetscInt step, PetscReal t)
   PetscFunctionReturn(0);
 }
 
-/* Values of the start are those of the first step's beginning, where accelerations and multipliers are consistent. Times that lie within
-   rounding of the end of a step are that end, where a sample costs nothing. A run that is solved in parts is not sampled twice where they meet. */
+/* The values at the start are evaluated after the first step, at its beginning, when accelerations and multipliers are
+   consistent. Sample times within rounding of the end of a step are moved to that end, where a sample needs no
+   interpolation. A run that is solved in parts is sampled only once at the time where two parts meet. */
 PetscErrorCode Recorder::look(TS ts, PetscInt step, PetscReal t)
 {
   PetscReal begin;

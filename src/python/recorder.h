@@ -16,18 +16,18 @@ class Recorder
 public:
   Recorder(std::shared_ptr<Scene> scene, double dt) : scene_(std::move(scene)), dt_(dt) {}
 
-  void                        resume(PetscReal t); /* from a checkpoint at t: what was recorded after it counts no longer */
+  void                        resume(PetscReal t); /* after loading a checkpoint at t: removes what was recorded after t */
   PetscErrorCode              look(TS ts, PetscInt step, PetscReal t);
   PetscErrorCode              lookAtEnd(TS ts, PetscInt step, PetscReal t);
   const std::vector<double>  &times() const { return times_; }
-  const std::vector<double>  &values() const { return values_; } /* all channels of a time behind one another */
+  const std::vector<double>  &values() const { return values_; } /* the values of all channels at the first time, then at the second, and so on */
 
 private:
   std::shared_ptr<Scene> scene_;
-  double                 dt_; /* 0: ends of steps */
+  double                 dt_; /* time between samples; 0: at the ends of steps */
   std::vector<double>    times_, values_, one_;
-  PetscInt64             next_    = 0; /* multiple of dt */
-  bool                   resumed_ = false; /* the first state that is seen is not the end of a step, but where the checkpoint begins */
+  PetscInt64             next_    = 0; /* number of the next sample time, in multiples of dt_ */
+  bool                   resumed_ = false; /* the first state that the monitor sees is that of the checkpoint, not the end of a step */
 
   PetscErrorCode add(TS ts, PetscReal t);
 };

@@ -30,7 +30,7 @@ Element AddElement(Scene &scene, const std::string &kind, const std::string &nam
   return py::isinstance<py::dict>(fields) ? k.add(scene, name, py::dict(fields)) : k.again(scene, name, fields);
 }
 
-/* Mass, pose and velocities from the fields of Python's RigidBody, PointMass, FlexibleBody */
+/* Sets mass, pose and velocities from the fields of Python's RigidBody, PointMass or FlexibleBody */
 template <class B> void Moving(const py::dict &d, const std::string &name, B &b)
 {
   b.position    = ToVector(d["position"], name + ": position");
@@ -88,7 +88,7 @@ template <class Spec> Body AddBody(Scene &s, const std::string &name, py::object
   }));
 }
 
-/* A place: position and axes, now or whenever parameters have changed */
+/* Converts a place: position and axes, given now or by a function that is called whenever parameters have changed */
 Place ToPlace(py::handle x)
 {
   const py::tuple t = py::reinterpret_borrow<py::tuple>(x);
@@ -124,7 +124,8 @@ py::object NewRun(Scene &s, py::object from)
   return run;
 }
 
-/* Python's other threads go on meanwhile. What is called back may destroy the Python object's TS, so that the run is held here. */
+/* Releases Python's lock, so that other threads continue. A callback may destroy the TS of the Python object, so that a
+   reference to it is held here. */
 void Solve(Scene &s, py::object ts)
 {
   const py::object held = FromTS(ToTS(ts));
@@ -207,7 +208,8 @@ void BindScene(py::module_ &m)
       for (const ModalAttachment &a : b.attachments) all[a.name.c_str()] = FromVector(a.position);
       return all;
     });
-  /* Bodies, markers, elements and gravity may be described by Python functions, whose exceptions, Ctrl-C too, go on as they are */
+  /* Bodies, markers, elements and gravity may be described by Python functions; their exceptions, including
+     KeyboardInterrupt, are raised unchanged */
   py::class_<Scene, ScenePointer>(m, "Scene")
     .def(py::init([](py::object comm, bool planar) { return std::make_shared<Scene>(ToComm(comm), planar ? Space::Planar : Space::Spatial); }))
     .def("ground", [](Scene &s) { return Out(s.ground()); })

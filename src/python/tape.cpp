@@ -50,12 +50,16 @@ double ValueOf(const Tape::Function &f, const std::vector<double> &x)
   }
 }
 
-/* Central differences over steps that become shorter by `shorter` each, at most so many: 6e-6 of the argument (or of 1) to 4.5e-14 of it. An argument may be as
-   small as micrometres in metres are, so that the first step may be longer than all that the function does. Test: Operations.test_differences of test_expressions.py. */
+/* Central differences over at most `steps_tried` steps, each shorter than the one before by the factor `shorter`: from
+   6e-6 of the argument (or of 1) to 4.5e-14 of it. An argument may be very small in its unit, such as micrometres in
+   metres, so that the first step may be longer than the whole range in which the function varies. Test:
+   Operations.test_differences of test_expressions.py. */
 constexpr int    steps_tried = 10;
 constexpr double shorter     = 8;
-constexpr double agreement   = 1e-6; /* of two differences, relative: enough for the Newton matrix and for the directions of reactions */
-constexpr double noisy       = 0.1;  /* relative difference below which a difference has told something, so that what grows after it is noise */
+/* relative difference of two successive results that ends the search: sufficient for the Newton matrix and for the
+   directions of reactions */
+constexpr double agreement   = 1e-6;
+constexpr double noisy       = 0.1;  /* once the relative difference of two results is below this, larger ones at shorter steps are caused by noise */
 
 struct Difference {
   double slope, bend, change, size, h; /* (f+ - f-) / 2h; f+ - 2 f + f-; |f+ - f-|; the largest |f|; h */
@@ -72,8 +76,9 @@ Difference DifferenceOf(const Tape::Function &f, std::vector<double> &x, std::si
   return {(up - down) / (above - below), up - 2 * y + down, std::abs(up - down), std::max({std::abs(up), std::abs(down), std::abs(y)}), 0.5 * (above - below)};
 }
 
-/* Whether a and b, over a shorter step, say the same but for rounding. Of a short hump between the four places the slopes may agree by chance (both are zero);
-   its bend does not fall with the step, as it does by 64 where f is smooth, and by 8 at a kink. */
+/* Whether a, and b over a shorter step, agree up to rounding. If f has a short hump between the four points, both slopes
+   may be zero and agree by chance. Therefore the second difference `bend` must also decrease: with this ratio of steps it
+   decreases by a factor of 64 if f is smooth, and of 8 at a kink. */
 bool Agree(const Difference &a, const Difference &b)
 {
   const double rounding = 8 * DBL_EPSILON * std::max(a.size, b.size);
@@ -81,8 +86,9 @@ bool Agree(const Difference &a, const Difference &b)
          std::abs(b.bend) <= std::max({std::abs(a.bend) / 4, 8 * rounding, 1e-3 * b.change});
 }
 
-/* The derivative of f by its argument k, f(x) = y: the difference over the longest step that agrees with the next one. Where none does, because f is noisy or has
-   a singularity, that of the pair which differs least: truncation falls with the step, noise grows. */
+/* The derivative of f by its argument k, where f(x) = y: the difference over the longest step that agrees with the next
+   one. If none does, because f is noisy or has a singularity, that of the two successive steps whose results differ
+   least: the truncation error decreases with the step, while the effect of noise increases. */
 double SlopeOf(const Tape::Function &f, std::vector<double> &x, std::size_t k, double y)
 {
   double     h = std::cbrt(DBL_EPSILON) * std::max(1.0, std::abs(x[k])), best = 0, least = -1, before[2] = {0, 0};
@@ -104,7 +110,8 @@ double SlopeOf(const Tape::Function &f, std::vector<double> &x, std::size_t k, d
   return least < 0 ? a.slope : best;
 }
 
-/* By the user's function, else by differences, of f(x) = y; needed: the arguments that the formula's derivatives depend on */
+/* The gradient of f at x, where f(x) = y, from the user's gradient function or else by differences; needed: the arguments
+   on which the derivatives of the formula depend */
 std::vector<double> GradientOf(const Tape::Function &f, std::vector<double> x, double y, const std::vector<bool> &needed)
 {
   py::gil_scoped_acquire gil;
@@ -149,7 +156,8 @@ Number Apply(const Tape::Function &, const std::vector<Number> &)
   throw std::runtime_error("a Python function in a function of time has no derivatives: give them with hhtdae.time_values()");
 }
 
-/* Memory that stays with the thread, lent to one evaluation at a time: a callback may evaluate this tape or another one, in another run */
+/* Work memory of a thread, reused by its evaluations. Nested evaluations have separate memory, since a callback may
+   evaluate this tape or another one, in another run */
 template <class N> class Lent
 {
 public:
@@ -173,7 +181,7 @@ private:
 
 } // namespace
 
-/* Every operation is evaluated, both branches of `where` too: it selects, so that what the other branch is does not matter. */
+/* Every operation is evaluated, including both branches of `where`, which selects one value, so that the other one may be NaN. */
 template <class N> void Tape::run(const N *u, std::vector<N> &x) const
 {
   using std::abs, std::acos, std::asin, std::atan, std::atan2, std::cbrt, std::cos, std::cosh, std::exp, std::hypot, std::log, std::log10, std::max,
@@ -239,8 +247,8 @@ void Tape::evaluate(const double *u, double *out) const
   for (std::size_t k = 0; k < outputs.size(); k++) out[k] = lent.x[outputs[k]];
 }
 
-/* Residuals and channels need no derivatives: plain numbers are an eighth of the memory that numbers with up to 16 derivatives move. Of channels there
-   may be more arguments than that. */
+/* Residuals and channels need no derivatives and are evaluated with plain numbers, which need an eighth of the memory
+   traffic of numbers with up to 16 derivatives. Channels may also have more than 16 arguments. */
 Real Tape::operator()(const Real *u) const
 {
   Lent<double> values(arguments);

@@ -1,6 +1,6 @@
 /*
-  A function that was written in Python, as a list of operations on numbers: what expressions.py has traced. It is evaluated without
-  Python, on plain numbers, on numbers with derivatives (dual.h), and on those of time functions.
+  A tape is a function written in Python that expressions.py has traced as a list of operations on numbers. It is evaluated without
+  Python, for plain numbers, for numbers with derivatives (dual.h), and for those of time functions.
 */
 #ifndef HHTDAE_PYTHON_TAPE_H
 #define HHTDAE_PYTHON_TAPE_H
@@ -15,7 +15,7 @@ namespace hhtdae
 namespace python
 {
 
-/* Name in Python, number of operands, which are a, b, c in this order. Of constant, argument, parameter, table and function c is an index. */
+/* Name in Python, and number of operands, which are a, b, c in this order. For constant, argument, parameter, table and function, c is an index. */
 #define HHTDAE_TAPE_OPERATIONS(X)                                                                                                       \
   X(constant, 0) X(argument, 0) X(parameter, 0) X(add, 2) X(subtract, 2) X(multiply, 2) X(divide, 2) X(negate, 1) X(power, 2)            \
   X(sin, 1) X(cos, 1) X(tan, 1) X(asin, 1) X(acos, 1) X(atan, 1) X(atan2, 2) X(sinh, 1) X(cosh, 1) X(tanh, 1) X(exp, 1) X(log, 1)        \
@@ -33,9 +33,9 @@ public:
   struct Operation {
     int code, a, b, c;
   };
-  /* A Python function that is called at every evaluation; borrowed, whoever describes the scene keeps it */
+  /* A Python function that is called at every evaluation; a borrowed reference, since the Python scene owns the function */
   struct Function {
-    PyObject        *value, *gradient; /* None: central differences */
+    PyObject        *value, *gradient; /* gradient: None for central differences */
     std::vector<int> operands;
   };
 
@@ -47,9 +47,9 @@ public:
   std::vector<int>          outputs;
   int                       arguments = 0;
 
-  /* out: one for each of outputs */
+  /* out: one value for each output */
   void evaluate(const double *arguments, double *out) const;
-  Real operator()(const Real *arguments) const;                                         /* the first output */
+  Real operator()(const Real *arguments) const;                                         /* returns the first output */
   TimeFunction::Number operator()(const TimeFunction::Number &t) const;
 
 private:
