@@ -1,10 +1,10 @@
 """Multibody dynamics on PETSc: index-3 differential-algebraic equations by the Hilber-Hughes-Taylor method.
 
-Three doors, the same engine:
+There are three ways to use the integrator:
 
 - ``ts.setType("hhtdae")`` on petsc4py's TS, with `hhtdae.integrator` for the method's own settings and results;
-- `solve_mechanism` for equations of motion that one has written oneself, in the manner of scipy.integrate.solve_ivp;
-- `Scene` for mechanisms in their own terms, with `hhtdae.flexible` for flexible bodies from finite-element models.
+- `solve_mechanism` for equations of motion given as Python functions, in the manner of scipy.integrate.solve_ivp;
+- `Scene` for mechanisms described by bodies, joints and forces, with `hhtdae.flexible` for flexible bodies from finite-element models.
 
 >>> import hhtdae
 >>> scene = hhtdae.Scene(gravity=(0, -9.81, 0))
@@ -20,15 +20,16 @@ PETSc is initialized by petsc4py. For options of the command line, before anythi
     petsc4py.init(sys.argv)
     import hhtdae
 
-PETSc is for one thread at a time: a scene, its runs and what they are asked belong to one thread at a time, and no two threads solve at once, see `Run`; for runs
-side by side use processes.
+PETSc is for one thread at a time: a scene, its runs and queries of them are used by one thread at a time, and no two threads solve at once, see
+`Run`; for parallel runs use processes.
 
-On several ranks an exception that nobody catches ends all ranks by MPI_Abort, once its traceback is printed; `sys.excepthook` does it, unless another is set later.
+On several ranks an uncaught exception ends all ranks by MPI_Abort after its traceback is printed; `sys.excepthook` does this, unless it is
+replaced later.
 
-Formulas of measures and parameters (`hhtdae.expressions`, `hhtdae.measures`) are evaluated in C++, see there.
+Formulas of measures and parameters are evaluated in C++, see `hhtdae.expressions` and `hhtdae.measures`.
 """
 
-from petsc4py import PETSc as _PETSc  # initializes MPI and PETSc, and ends them after all that is below
+from petsc4py import PETSc as _PETSc  # initializes MPI and PETSc; they are finalized after everything imported below
 
 from . import _core
 
@@ -57,7 +58,7 @@ for _module in (bodies, elements, expressions, measures, query, recipe, results,
 
 
 def __getattr__(name):
-    # Flexible bodies bring SLEPc with them: only for those who ask, by name.
+    # hhtdae.flexible loads SLEPc, so that it is imported at its first use only.
     if name == "flexible":
         import importlib
 

@@ -36,7 +36,7 @@ Error.__module__ = "hhtdae"
 
 
 def fail(code, text, specific, cause):
-    """What the C++ part calls where PETSc has returned an error"""
+    """Raises the exception for an error of PETSc; called by the C++ part"""
     if isinstance(cause, (KeyboardInterrupt, SystemExit)):
         raise cause
     trace = [line.split("] ", 1)[-1] for line in getattr(PETSc.Error, "_traceback_", [])]
@@ -44,7 +44,8 @@ def fail(code, text, specific, cause):
     raise Error(code, in_python(message), trace) from cause
 
 
-# What the library's messages, which name its own functions, call in Python; the first that fits. What is left of Class::functionName is Class.function_name.
+# Replacements that turn the names of C++ functions in the library's messages into Python's names; the first that matches is used. Any other
+# Class::functionName becomes Class.function_name.
 _NAMES = [
     (r"-scene_assemble project", 'scene.start(assembly="project"), or the option -scene_assemble project'),
     (r"Scene::createTS\(&next, ts\)", "Scene.run(after=run)"),
@@ -66,7 +67,7 @@ _NAMES = [
 
 
 def in_python(message):
-    """A message of the library with Python's names"""
+    """A message of the library with names of C++ replaced by Python's names"""
     for name, here in _NAMES:
         message = re.sub(name, here, message)
     return re.sub(r"\b(Scene|Run|Snapshot|Linearization)::(\w+)", lambda m: m[1] + "." + re.sub("[A-Z]", lambda c: "_" + c[0].lower(), m[2]), message)

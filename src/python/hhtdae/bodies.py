@@ -23,7 +23,7 @@ class RigidBody(Spec):
     ----------
     mass : float
     inertia : (3, 3)
-        About the centre of mass, in body axes; three numbers are its diagonal. Planar scenes: element [2, 2] alone counts.
+        About the centre of mass, in body axes; three numbers are its diagonal. Planar scenes use element [2, 2] only.
     position : (3,)
         Of the body's origin, space axes.
     rotation : (3, 3)
@@ -31,7 +31,7 @@ class RigidBody(Spec):
     velocity, angular_velocity : (3,)
         Of the centre of mass, space axes; radians per unit of time.
     center : (3,)
-        Of mass, in body axes from the body's origin.
+        Centre of mass relative to the body's origin, in body axes.
     fixed_start : bool
         The assembly phase leaves pose and velocities as given.
     """
@@ -62,12 +62,12 @@ class PointMass(Spec):
 
 @dataclass(eq=False)
 class FlexibleBody(Spec):
-    """A body in modal coordinates, its floating frame at the start; joints and forces take hold of its attachments.
+    """A body in modal coordinates, with the pose and velocity of its floating frame at the start; joints and forces act on its attachments.
 
     Parameters
     ----------
     model : ModalBody or ReducedBody
-        From `hhtdae.flexible`: what `reduce` or ``load_modal_body(file)`` gives.
+        The result of `reduce` or ``load_modal_body(file)`` of `hhtdae.flexible`.
     position, rotation : (3,), (3, 3)
         Of the origin and axes (columns) of the FE model, space axes.
     velocity, angular_velocity : (3,)
@@ -75,10 +75,11 @@ class FlexibleBody(Spec):
     mass : str
         "full", "partial" (without the terms quadratic in the modes) or "constant" (of the undeformed body).
     damping : float or sequence of (frequency, ratio)
-        Ratio of critical, of all modes or by bands up to a frequency in cycles per unit of time, the last ratio also beyond: of the modes of `model`,
-        those of the free body. Held somewhere, it vibrates more slowly in other modes, whose ratios are smaller: that of a cantilever's first mode is a fourteenth.
+        Damping ratio (of critical) of all modes, or of bands up to a frequency in cycles per unit of time; the last ratio also applies above the
+        last band. The modes are those of `model`, which are modes of the free body. A supported body vibrates more slowly, in other modes with
+        smaller ratios: the ratio of a cantilever's first mode is a fourteenth of the given one.
     ratios : (modes,), optional
-        The same, mode by mode, in place of `damping`.
+        Damping ratio of each mode, instead of `damping`.
     deformation, deformation_rate : (modes,), optional
         Modal coordinates at the start.
     """
@@ -115,9 +116,9 @@ class FlexibleBody(Spec):
 
 @dataclass(eq=False)
 class Shape:
-    """What a body looks like in animations and pages: made by `Shape.box`, `Shape.cylinder` and `Shape.sphere`.
+    """The shape of a body in animations and pages, made by `Shape.box`, `Shape.cylinder` or `Shape.sphere`.
 
-    colour : in the page, a number 0xRRGGBB or "#rrggbb"; default: one of its own for each body
+    colour : in the page, a number 0xRRGGBB or "#rrggbb"; default: a different colour for each body
     """
     kind: str
     size: Tuple[float, float, float]
@@ -127,7 +128,7 @@ class Shape:
 
     @classmethod
     def box(cls, half, position=(0., 0., 0.), axes=None, colour=None):
-        """A box by half of its edges."""
+        """A box, given by its half edges."""
         return cls("box", tuple(half), position, np.eye(3) if axes is None else axes, colour)
 
     @classmethod
@@ -158,7 +159,7 @@ def _direction(x, of):
     try:
         d = np.asarray(x, dtype=float)
         length = np.linalg.norm(d)
-    except ValueError:  # a text, say
+    except ValueError:  # x is not numeric, for example a string
         length = 0.
     if not (0 < length < np.inf and d.shape == (3,)):
         raise ValueError(f"{of} must be a direction, three numbers that are not all zero, not {x.tolist() if isinstance(x, np.ndarray) else x!r}")
@@ -166,7 +167,7 @@ def _direction(x, of):
 
 
 def axes_along(z, x=None):
-    """Right-handed orthonormal axes, as columns, whose z axis is along a direction of any length, and x as near to `x` as can be."""
+    """Right-handed orthonormal axes, as columns: the z axis is along the vector `z` of any length, the x axis as near to `x` as possible."""
     z = _direction(z, "axes_along: z")
     given = np.zeros(3) if x is None else np.asarray(x, dtype=float)
     p = given - z.dot(given) * z
@@ -237,23 +238,23 @@ class inertia:
 
     @staticmethod
     def sphere(mass, radius):
-        """A full sphere."""
+        """A solid sphere."""
         return inertia.ellipsoid(mass, (radius, radius, radius))
 
     @staticmethod
     def about(J, mass, d):
-        """From the centre of mass to a point at d from it, Steiner's parallel axes."""
+        """The moments of inertia about the point at d from the centre of mass, by the parallel axis theorem; J: about the centre of mass."""
         d = _numbers(d)
         return np.asarray(J) + mass * (d.dot(d) * np.eye(3) - np.outer(d, d))
 
     @staticmethod
     def turned(J, R):
-        """Of a part whose axes are the columns of R, in the axes that R is given in."""
+        """J, given in the axes of a part, transformed to the axes in which R is given; the columns of R are the axes of the part."""
         return np.asarray(R) @ np.asarray(J) @ np.asarray(R).T
 
 
 def composed(parts):
-    """A `RigidBody` of several, in the axes in which their positions and rotations are given, its origin there."""
+    """A `RigidBody` composed of several ones; its origin and axes are those in which positions and rotations of the parts are given."""
     parts = list(parts)
     mass = sum(p.mass for p in parts)
     centers = [_numbers(p.position) + _numbers(p.rotation) @ _numbers(p.center) for p in parts]

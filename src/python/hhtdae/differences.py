@@ -1,15 +1,16 @@
-"""Derivatives of the user's functions by central differences, and the scale of the numbers that they are taken over."""
+"""Derivatives of users' functions by central differences, and the scales of their arguments, which determine the steps of the differences."""
 
 import numpy as np
 
 
 def differences(f, x, rows, scale):
-    """Central differences over 6e-6 of the scale of each number: error of truncation and of rounding are about the same, 1e-10"""
+    """Central differences with steps of 6e-6 times the scale of each argument: truncation and rounding errors are then about equal, 1e-10"""
     return _over(f, x, rows, 6e-6 * scale)
 
 
 def slopes(f, x, rows):
-    """The same of a function that is linear: over 1, or the number itself, and where that drowns in the rounding of large values, over as much as these are"""
+    """Central differences of a linear function. The step is 1 or the magnitude of the argument; if the differences are then lost in the rounding
+    of large values of f, the step is the magnitude of these values"""
     increments = np.maximum(1., np.abs(x))
     J, size = _over(f, x, rows, increments), np.max(np.abs(f(x)), initial=0.)
     drowned = np.max(np.abs(J), axis=0, initial=0.) * increments < 1e-6 * size
@@ -21,7 +22,7 @@ def slopes(f, x, rows):
 def _over(f, x, rows, increments):
     J, x = np.empty((rows, len(x))), np.array(x, dtype=float)
     for k, (at, h) in enumerate(zip(x.copy(), increments)):
-        up, down = at + h, at - h  # what rounding leaves of the increments
+        up, down = at + h, at - h  # up - down is the exact step after rounding
         x[k] = up
         above = f(x)
         x[k] = down
@@ -31,8 +32,9 @@ def _over(f, x, rows, increments):
 
 
 def scales(f, x):
-    """The scale of each number: its size or 1, or by how many powers of ten less f has to be looked at to be a parabola over a hundredth of a scale. Rows of f
-    that never are, where they have a kink, are passed over. Test: Scales of tests/python/test_mistakes.py."""
+    """The scale of each argument of f: its magnitude or 1, or a smaller one by powers of ten, so that f is nearly a parabola over the
+    neighbourhood that `_scale` tests. Rows of f that are a parabola at no scale, for example at a kink, are ignored. Test: Scales of
+    tests/python/test_mistakes.py."""
     return np.array([_scale(f, np.array(x, dtype=float), k) for k in range(len(x))])
 
 
@@ -41,7 +43,7 @@ def _scale(f, x, k):
     judged = []
     for decade in range(11):
         s = begin * 10.**-decade
-        if s < 1e-9 * abs(x[k]):  # rounding of the number itself
+        if s < 1e-9 * abs(x[k]):  # differences would be rounding of the argument
             break
         good, small = _parabola(f, x, k, 1e-3 * s)
         judged.append((s, good, small))
@@ -52,13 +54,15 @@ def _scale(f, x, k):
 
 
 def smooth(f, x, distances):
-    """Which rows of f are parabolas, by each number, over so much on both sides, or do not depend on it: not those with a kink or a jump there. (rows, numbers)"""
+    """(rows, arguments): whether a row of f, as a function of one argument, is nearly a parabola over the given distance on both sides, or does
+    not depend on it. This is false for rows with a kink or a jump there."""
     x = np.array(x, dtype=float)
     return np.array([np.logical_or(*_parabola(f, x, k, d)) for k, d in enumerate(distances)]).T
 
 
 def _parabola(f, x, k, d):
-    """Which rows of f are parabolas over x_k - 2 d to x_k + 2 d, and which do not depend on x_k to rounding. A place where f fails is too far away."""
+    """Which rows of f are nearly parabolas from x_k - 2 d to x_k + 2 d, and which do not depend on x_k up to rounding. If f raises an exception,
+    d is too large."""
     y = []
     with np.errstate(all="ignore"):
         for step in (0, d, -d, 2 * d, -2 * d):

@@ -1,7 +1,7 @@
-"""Joints, motions and forces: what `Scene.add` takes beside bodies.
+"""Joints, motions and forces: arguments of `Scene.add` other than bodies.
 
-Marker i is on the body that is acted on, marker j on the one that takes the reaction. Any number may be a `Parameter` or a formula of parameters;
-then the element is described anew for every run. `state=True` carries a force's components as unknowns of the equations.
+Loads are those on the body of marker i; the reaction acts on the body of marker j. Any number may be a `Parameter` or a formula of parameters;
+then the element is described anew for every run. With `state=True` the components of a force are unknowns of the equations.
 """
 
 from typing import List
@@ -14,5 +14,5 @@ __all__: List[str] = []
 __all__ += joints.__all__
 __all__ += forces.__all__
 
-#: Names of the classes that are elements, which is all but parts of elements
+#: Names of the classes that are elements; the others are parts of elements
 ELEMENTS = tuple(name for name in __all__ if name not in ("Term", "ContactLaw"))

@@ -1,4 +1,4 @@
-"""Zeros of functions of the state between the ends of a step."""
+"""Finds zeros of functions of the state within a step."""
 
 import math
 
@@ -6,20 +6,20 @@ import numpy as np
 
 
 def zero(f, a, fa, b, fb):
-    """Where f leaves the sign that it has at a, to rounding, from the side of b > a: secants, halved values at an end that stays (Illinois), and bisection
-    where these are slow or f is zero in a whole part."""
+    """The smallest t > a, to rounding, at which f no longer has the sign that it has at a, where b > a: by the Illinois variant of regula falsi,
+    and by bisection if that converges slowly or f is zero in a whole interval."""
     side, sign = 0, math.copysign(1, fa)
     for k in range(200):
         near = 4e-16 * max(abs(a), abs(b))
         if b - a <= near:
             break
-        if fb == 0 and side == 2:  # met exactly: ends here if f has its sign just before
+        if fb == 0 and side == 2:  # f(b) is exactly zero: done if f still has its sign just before b
             t = b - near
         else:
             t = 0.5 * (a + b) if k % 4 == 3 or fb == 0 else b - fb * (b - a) / (fb - fa)
         if not math.isfinite(t):
             t = 0.5 * (a + b)
-        t = float(min(max(t, np.nextafter(a, b)), np.nextafter(b, a)))  # a zero within rounding of an end
+        t = float(min(max(t, np.nextafter(a, b)), np.nextafter(b, a)))  # t stays strictly between a and b if the zero is within rounding of one
         ft = f(t)
         if ft * sign > 0:
             a, fa = t, ft
@@ -34,15 +34,15 @@ def zero(f, a, fa, b, fb):
 
 
 class Signs:
-    """Finds passages of functions through zero, each in the step in which it happens, from their values at both ends. What happens between two steps, a
-    jump of the velocities by an action, is no passage.
+    """Finds passages of functions through zero within a step, from their values at both ends of the step. A change of sign between two steps,
+    caused by an action that makes velocities jump, is not a passage.
 
-    A function that is zero where a step begins, as it is after an event, is looked at from a thousandth of that step on, or of the time since
-    its last event where that is shorter: bounces become as short as one likes.
+    A function that is zero at the beginning of a step, as after an event, is evaluated from a thousandth of that step on, or of the time since
+    its last event if that is shorter, so that arbitrarily short bounces are found.
 
-    The step after an event begins with other accelerations and reactions than the one before ended with, by the error of the step, so that functions
-    of these may be back a little on the side that they come from. They have passed for all that, and do not pass again until they are twice as far
-    away from zero as they were there: test Reactions.
+    The step after an event begins with accelerations and reactions that differ from those at the end of the step before by the error of the step. So
+    functions of these may be slightly back on the side from which they came. This does not count as a further passage until they are twice as far
+    away from zero as at that beginning: test Reactions.
     """
 
     def __init__(self, directions=()):
@@ -52,21 +52,23 @@ class Signs:
 
     def add(self, direction):
         self.directions.append(int(direction))
-        self.last.append((-math.inf, math.inf))  # time of its last passage, and since the one before
-        self.side.append(0.)  # a value on the side where it was before the passage; 0: the state has been changed since then
-        self.back.append(0.)  # the value where the step after the passage began, if it was on that side
+        self.last.append((-math.inf, math.inf))  # time of the last passage, and time between it and the one before
+        self.side.append(0.)  # a value with the sign before the passage; 0 if an action has changed the state since then
+        self.back.append(0.)  # the value at the beginning of the step after the passage if it has that sign, else 0
 
     def note(self, k, time):
-        """A passage has happened, and the next step begins there"""
+        """Records a passage of function k, at which the next step begins"""
         before = self.last[k][0]
         self.last[k] = time, time - before
 
     def changed(self):
-        """Somebody has changed the state where the next step begins: on which side functions are there is no error"""
+        """To be called if the state was changed at the beginning of the next step: the signs of functions there are then not due to errors of the
+        step"""
         self.side = [0.] * len(self.side)
 
     def passed(self, begin, end, at):
-        """(time, number) of all passages between two times of one step, in order of time; at(k, t) is function k there"""
+        """The pairs (time, number of the function) of all passages between two times of one step, in order of time; at(k, t) is the value of
+        function k at t"""
         found = []
         for k, direction in enumerate(self.directions):
             start, before, after = begin, at(k, begin), at(k, end)

@@ -1,4 +1,4 @@
-"""Formulas: numbers that are known when a run evaluates them.
+"""Formulas: numbers that a run evaluates.
 
 Measures of the state, parameters and their combinations are expressions. They are built by ordinary operators and by the functions of this
 module (or numpy's), once; a run evaluates them, with exact derivatives, in C++ without calling Python::
@@ -6,8 +6,9 @@ module (or numpy's), once; a run evaluates them, with exact derivatives, in C++ 
     power = hhtdae.force(motor, 0) * hhtdae.angular_velocity(shaft, "z")
     law = lambda l, v: 100 * (l - 1)**3 + 2 * v          # called once, with two expressions
 
-A formula cannot ask ``if`` of a value that is not known yet: ``where(x > 0, a, b)`` chooses in every evaluation, ``minimum`` and ``maximum``
-likewise. What cannot be written as a formula can be a ``callback``, at the cost of a call of Python in every evaluation.
+``if`` cannot be used in a formula, since values are not known yet when it is built: ``where(x > 0, a, b)`` selects a value in every evaluation,
+as do ``minimum`` and ``maximum``. A function that cannot be written as a formula can be a ``callback``, at the cost of a call of Python in every
+evaluation.
 """
 
 import numbers
@@ -24,12 +25,12 @@ __all__ = ["Expression", "Parameter", "TimeFunction", "abs_", "arccos", "arcsin"
 
 CONDITIONS = ("less", "less_equal", "equal", "logical_not", "logical_and", "logical_or")
 
-_describing = []  # not empty while a function describes, which is called again when parameters have changed
+_describing = []  # not empty while a describing function runs, which is called again when parameters have changed
 
 
 @contextmanager
 def describing():
-    """Formulas of parameters stand for their present values."""
+    """A context in which formulas of parameters are replaced by their present values."""
     _describing.append(True)
     try:
         yield
@@ -86,7 +87,7 @@ class Expression:
         return float(compile_tape([self], {}, [])(np.empty(0))[0])
 
     def get(self):
-        """The present value of a formula of parameters and numbers alone."""
+        """The present value of a formula that contains only parameters and numbers."""
         with describing():
             return float(self)
 
@@ -129,9 +130,9 @@ class Expression:
 
 
 class Parameter(Expression):
-    """A number of a scene's description that has a name and may be another one in the next run, see `Scene.parameter`.
+    """A named number of a scene's description, which may have another value in the next run, see `Scene.parameter`.
 
-    Formulas of it, ``2 * stiffness``, may stand for any number of the description.
+    Formulas of it, such as ``2 * stiffness``, may be given for any number of the description.
     """
 
     __slots__ = ("name", "_scene")
@@ -145,7 +146,7 @@ class Parameter(Expression):
         return self.value.value
 
     def set(self, value):
-        """Gives it another value, for runs made from now on and, in formulas of the state, at once. Collective."""
+        """Changes its value: in formulas of the state at once, in the description for runs made from now on. Collective."""
         self._scene.set(**{self.name: value})
 
     def __reduce__(self):
@@ -189,7 +190,7 @@ class _Callback:
         self.function, self.gradient = function, gradient
 
 
-# ---- construction, with what is known of 0 and 1 ----
+# ---- construction of expressions, simplified where operands are 0 or 1 ----
 
 def _expression(x):
     if isinstance(x, Expression):
@@ -206,7 +207,7 @@ def _constant(x):
 
 
 def _arrays(function, *x):
-    """The function element by element where an operand is an array; NotImplemented's work for mixed operands"""
+    """Applies the function element by element to arrays, for operators with an array and an expression as operands"""
     return np.frompyfunc(function, len(x), 1)(*[y if isinstance(y, np.ndarray) else np.array(y, dtype=object) for y in x])
 
 
@@ -291,7 +292,8 @@ for _name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "log10"
 
 
 def _by_elements(function, *x):
-    """A function of numbers and formulas, or of arrays and lists of them element by element; numbers where all of them are"""
+    """Applies a function to numbers and formulas, or element by element to arrays and lists of these; the result is a number if all operands are
+    numbers"""
     x = [np.array(y, dtype=object) if isinstance(y, (list, tuple)) else y for y in x]
     arrays = [y for y in x if isinstance(y, np.ndarray)]
     result = _arrays(function, *x) if any(y.ndim for y in arrays) else function(*x)
@@ -325,9 +327,9 @@ for _name in ("sin cos tan arcsin arccos arctan arctan2 sinh cosh tanh exp log l
 
 
 def where(condition, a, b):
-    """``a`` where the condition holds, else ``b``, chosen in every evaluation; both are evaluated. Arrays element by element.
+    """``a`` if the condition holds, else ``b``, selected in every evaluation; both are evaluated. Arrays are treated element by element.
 
-    A load that jumps at a time is better a `Parameter` that an action of `Run.event` sets, see `time`."""
+    For a load that jumps at a time, a `Parameter` that an action of `Run.event` sets is better, see `time`."""
     return _by_elements(_where, condition, a, b)
 
 
@@ -345,12 +347,12 @@ def _step(x, x0, h0, x1, h1, shape):
 
 
 def step(x, x0, h0, x1, h1):
-    """From h0 where x <= x0 to h1 where x >= x1 by a cubic, as STEP is known; its second derivative jumps at both ends."""
+    """A step from h0 for x <= x0 to h1 for x >= x1 by a cubic, like Adams' STEP; its second derivative jumps at both ends."""
     return _by_elements(lambda *y: _step(*y, lambda s: s * s * (3 - 2 * s)), x, x0, h0, x1, h1)
 
 
 def step5(x, x0, h0, x1, h1):
-    """From h0 where x <= x0 to h1 where x >= x1 by a quintic, as STEP5 is known: twice continuously differentiable."""
+    """A step from h0 for x <= x0 to h1 for x >= x1 by a quintic, like Adams' STEP5: twice continuously differentiable."""
     return _by_elements(lambda *y: _step(*y, lambda s: s * s * s * (10 + s * (6 * s - 15))), x, x0, h0, x1, h1)
 
 
@@ -360,15 +362,15 @@ def callback(function, *arguments, gradient=None):
     Parameters
     ----------
     function : callable
-        Takes as many numbers as there are `arguments`, returns a number. It should be smooth, and must depend on its arguments alone.
+        Takes as many numbers as there are `arguments`, returns a number. It should be smooth, and must depend on its arguments only.
     *arguments : Expression
-        What it is called with.
+        The arguments of the function.
     gradient : callable, optional
-        The derivatives by the arguments, as many numbers. Without it they are central differences: as a rule four calls for each argument in every
-        evaluation of the Jacobian. The first two steps are 6e-6 and 8e-7 of the argument, or of 1 if it is smaller; where these differences disagree, since the
-        argument is small in its unit, at a kink, or because the function is noisy, shorter steps follow, up to twenty calls.
+        Returns the derivatives by all arguments. Without it they are central differences: usually four calls for each argument in every
+        evaluation of the Jacobian. The first two steps are 6e-6 and 8e-7 of the argument, or of 1 if it is smaller. If these differences
+        disagree, because the argument is small in its unit, at a kink, or because the function is noisy, shorter steps follow, up to twenty calls.
 
-    A call costs about a microsecond and what the function does; a formula of the same operations costs some ten nanoseconds each.
+    A call costs about a microsecond plus the time of the function; a formula costs some ten nanoseconds for each operation.
     """
     if not callable(function):
         raise TypeError("callback: %r cannot be called" % (function,))
@@ -378,7 +380,7 @@ def callback(function, *arguments, gradient=None):
 # ---- functions of one number ----
 
 def polynomial(coefficients):
-    """c0 + c1 t + c2 t^2 + ... as a `TimeFunction`; with formulas of parameters among the coefficients as a function that is traced."""
+    """c0 + c1 t + c2 t^2 + ... as a `TimeFunction`, or, if coefficients are formulas of parameters, as a function that is traced."""
     if any(isinstance(c, Expression) for c in coefficients):
         terms = list(coefficients)
 
@@ -392,16 +394,16 @@ def polynomial(coefficients):
 
 
 def harmonic(amplitude, omega, phase=0., offset=0.):
-    """offset + amplitude sin(omega t + phase) as a `TimeFunction`; omega in radians per unit of time. With formulas of parameters as a function that is
-    traced."""
+    """offset + amplitude sin(omega t + phase) as a `TimeFunction`, or, if arguments are formulas of parameters, as a function that is traced;
+    omega in radians per unit of time."""
     if any(isinstance(x, Expression) for x in (amplitude, omega, phase, offset)):
         return lambda t: offset + amplitude * sin(omega * t + phase)
     return TimeFunction(_core.TimeFunction.harmonic(amplitude, omega, phase, offset))
 
 
 def spline(x, y):
-    """Natural cubic spline through the points (x, y), x increasing, continued linearly, as a `TimeFunction`: a motion that was measured, or the
-    characteristic of a damper, ``spline(v, F)(hhtdae.rate(i, j))``."""
+    """Natural cubic spline through the points (x, y), x increasing, with linear extrapolation, as a `TimeFunction`: for example a measured
+    motion, or the characteristic of a damper, ``spline(v, F)(hhtdae.rate(i, j))``."""
     if any(isinstance(z, Expression) for z in (*np.ravel(np.asarray(x, dtype=object)), *np.ravel(np.asarray(y, dtype=object)))):
         raise TypeError("the points of a spline are numbers; multiply its value by a formula, or describe the element by a function, see Scene.add()")
     return TimeFunction(_core.TimeFunction.spline(np.asarray(x, dtype=float), np.asarray(y, dtype=float)))

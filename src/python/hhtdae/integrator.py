@@ -87,13 +87,14 @@ def set_predictor_degree(ts, degree):
 
 
 def set_reuse(ts, ratio, rate, hold):
-    """When the Newton matrix is made anew: `ratio`, the factor by which h may differ from the h of the matrix (default 1.4); `rate` of convergence beyond which the next step gets
-    a new one (0.25; 0.1 with the preconditioner hhtconstraint); `hold`, the factor below which a growth of h is not taken, so that the matrix lives on (1.2)."""
+    """When the Newton matrix is renewed. `ratio`: largest factor by which h may differ from the h of the matrix (default 1.4). `rate`: rate of
+    convergence above which the next step has a new matrix (0.25; 0.1 with the preconditioner hhtconstraint). `hold`: h is not increased by less
+    than this factor, so that the matrix can be kept (1.2)."""
     _core.set_reuse(ts, ratio, rate, hold)
 
 
 def set_role(ts, role, unknowns):
-    """Says what unknowns are; without it roles are read off the derivatives of the residual.
+    """Sets the role of unknowns; without it roles are determined from the derivatives of the residual.
 
     Parameters
     ----------
@@ -115,14 +116,16 @@ def get_role(ts, role):
 
 
 def set_nodes(ts, nodes, reference=None):
-    """Says which unknowns belong to nodes of finite elements, for ``-pc_type hhtconstraint``; scenes do it themselves. Collective, after the Jacobian.
+    """Sets which unknowns belong to nodes of finite elements, for ``-pc_type hhtconstraint``; scenes do this themselves. Collective, to be called
+    after the Jacobian is set.
 
     Parameters
     ----------
     nodes : petsc4py.PETSc.IS, (n, 3) array of int or None
-        Own unknowns by global number, those of a node one after the other (the block size of the IS); an empty list on a rank without nodes. None takes back what was said.
+        Global numbers of own unknowns, those of a node consecutively (the block size of the IS is their number); an empty list on a rank without
+        nodes. None removes the nodes.
     reference : petsc4py.PETSc.Vec, optional
-        Where the nodes are when these unknowns are zero, in their rows.
+        Positions of the nodes when these unknowns are zero, in the rows of the unknowns.
     """
     import numpy as np
     from petsc4py import PETSc
@@ -131,36 +134,36 @@ def set_nodes(ts, nodes, reference=None):
         nodes = np.asarray(nodes, dtype=PETSc.IntType)
         size = np.atleast_2d(nodes).shape[1] if nodes.size else 1
         own = PETSc.IS().createGeneral(nodes.ravel(), comm=ts.getComm())
-        own.setBlockSize(int(PETSc.Vec().createWithArray([size], comm=ts.getComm()).max()[1]))  # a rank without nodes cannot tell
+        own.setBlockSize(int(PETSc.Vec().createWithArray([size], comm=ts.getComm()).max()[1]))  # a rank without nodes does not know the block size
         nodes = own
     _core.set_nodes(ts, nodes, reference)
 
 
 def set_start(ts, start):
-    """About initial values that violate the constraints: "off" takes them as they are, "report" (the default) prints by how much they do, "project" moves them to the nearest
-    consistent ones."""
+    """What happens with initial values that violate the constraints: "off": they are used as they are; "report" (the default): the violation is
+    printed; "project": they are moved to the nearest consistent ones."""
     _core.set_start(ts, start)
 
 
 def set_step_limit(ts, function):
-    """The longest step from a state that the application allows: function(ts, t, u, v, a) returns it."""
+    """Sets function(ts, t, u, v, a), which returns the application's upper bound on the step that begins in this state."""
     _core.set_step_limit(ts, function)
 
 
 def set_row_name(ts, function):
-    """What an unknown and its row are called in messages: function(row) returns it by its global number, "" for no name."""
+    """Sets function(row), which returns the name of an unknown and its equation for messages, by its global number; "" for no name."""
     _core.set_row_name(ts, function)
 
 
 def set_coordinate_change(ts, test, map, commit=None):
-    """New generalized coordinates in the course of a run: test(ts, t, u, v) returns whether they are due, map(ts, t, u, v, a) changes the vectors in place, commit(ts)
-    is called when all vectors have been changed."""
+    """Sets functions that change the generalized coordinates during a run: test(ts, t, u, v) returns whether a change is due, map(ts, t, u, v, a)
+    transforms the vectors in place, commit(ts) is called after all vectors have been transformed."""
     _core.set_coordinate_change(ts, test, map, commit)
 
 
 def set_rotations(ts, rotations, refer, back):
-    """Says which coordinates are local rotation vectors, which count from the attitude at the last accepted step; their velocities are angular velocities
-    in axes of space.
+    """Sets which coordinates are local rotation vectors, relative to the attitude at the last accepted step; their velocities are angular velocities
+    in space axes.
 
     Parameters
     ----------
@@ -169,7 +172,7 @@ def set_rotations(ts, rotations, refer, back):
     refer : callable
         refer(ts, u): the attitudes of u become the reference, the rotation vectors in u zero.
     back : callable
-        back(ts): takes the reference before the last call of `refer` again.
+        back(ts): restores the reference before the last call of `refer`.
     """
     from petsc4py import PETSc
 
@@ -179,8 +182,8 @@ def set_rotations(ts, rotations, refer, back):
 
 
 def get_rotation_factor(ts):
-    """(factor, begin) of the step whose matrix is asked for: h^2 / 12 in a step of order two, gamma h (h - gamma h) / 2 above it, and the velocities at its beginning; 0 and None
-    where the matrix is not that of a step."""
+    """(factor, begin) of the step whose Newton matrix is being computed: h^2 / 12 in a step of order two, gamma h (h - gamma h) / 2 for higher
+    orders, and the velocities at the beginning of the step; 0 and None if the matrix is not that of a step."""
     return _core.get_rotation_factor(ts)
 
 
@@ -207,7 +210,8 @@ def move_back(ts, t):
 
 
 def evaluate_at(ts, t):
-    """(u, v, a) at a time of the last step: positions and velocities as of `interpolate`, accelerations and multipliers solved for from the equations there. New vectors."""
+    """(u, v, a) at a time of the last step, as new vectors: positions and velocities as of `interpolate`, accelerations and multipliers from the
+    equations of motion at that time."""
     return _core.evaluate_at(ts, t)
 
 
@@ -217,7 +221,7 @@ def statistics(ts):
 
 
 def checkpoint_save(ts, file):
-    """Writes the state of a run into a file, from which `checkpoint_load` goes on with the same bits. Collective."""
+    """Writes the state of a run to a file, from which `checkpoint_load` continues with bitwise identical results. Collective."""
     _core.checkpoint_save(ts, str(file))
 
 

@@ -1,4 +1,4 @@
-"""Equations of motion that one has written oneself, solved by one call in the manner of scipy.integrate.solve_ivp."""
+"""Solves equations of motion given as Python functions, by one call in the manner of scipy.integrate.solve_ivp."""
 
 import warnings
 
@@ -149,7 +149,7 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
 
 
 class _Problem:
-    """The user's functions with their sizes, checked"""
+    """The user's functions and the sizes of their results, which are checked"""
 
     def __init__(self, residual, t_span, q0, v0, constraints, velocity_constraints, jacobian, constraint_jacobian, args, trace):
         if np.shape(t_span) != (2,):
@@ -169,7 +169,7 @@ class _Problem:
             raise ValueError("q0 has %d numbers and v0 %d" % (self.n, len(self.v0)))
         self._residual, self._constraints, self._jacobian, self._gradient = residual, constraints, jacobian, constraint_jacobian
         self._rates = velocity_constraints
-        self.error = None  # the first exception of these functions in a run
+        self.error = None  # the first exception that these functions have raised in a run
         self.m = 0 if constraints is None else len(np.ravel(np.asarray(constraints(self.t0, self.q0.copy(), *self.args), dtype=float)))
         self.k = 0 if velocity_constraints is None else np.size(velocity_constraints(self.t0, self.q0.copy(), self.v0.copy(), *self.args))
         self.size = self.n + self.m + self.k
@@ -187,14 +187,14 @@ class _Problem:
                 self.check_jacobian()
 
     def name(self, row):
-        """Of an unknown and its row of the whole system, by the user's functions, for messages"""
+        """The name of an unknown and its equation, in terms of the user's functions, for messages"""
         for name, n in (("q", self.n), ("constraints()", self.m), ("velocity_constraints()", self.k)):
             if row < n:
                 return "%s[%d]" % (name, row)
             row -= n
 
     def _shaped(self, x, shape, what):
-        if hasattr(x, "toarray"):  # sparse, of SciPy
+        if hasattr(x, "toarray"):  # a sparse matrix of SciPy
             x = x.toarray()
         if np.iscomplexobj(x):
             raise ValueError("%s is complex, must be real" % what)
@@ -202,7 +202,7 @@ class _Problem:
             x = np.array(x, dtype=float)  # a copy: the function may write into the same array again
         except (TypeError, ValueError) as error:
             raise ValueError("%s must be numbers, is %r: %s" % (what, x, error)) from error
-        plain = lambda s: tuple(k for k in s if k != 1)  # (n, 1) and (1, n) are as good as (n,)
+        plain = lambda s: tuple(k for k in s if k != 1)  # shapes (n, 1) and (1, n) are accepted for (n,)
         if plain(x.shape) != plain(shape):
             raise ValueError("%s has the shape %s, must be %s" % (what, x.shape, shape))
         return x.reshape(shape)
@@ -227,14 +227,14 @@ class _Problem:
         return slopes(lambda x: self.rates(t, q, x), v, self.k) if self.k else np.empty((0, self.n))
 
     def reactions(self, t, q, v, multipliers):
-        """Forces of the constraints"""
+        """Forces of the constraints, Phi_q^T lambda + Psi_v^T mu"""
         return self.gradient(t, q).T @ multipliers[:self.m] + self.rate_gradient(t, q, v).T @ multipliers[self.m:]
 
     def forces(self, t, q, v, a, multipliers):
         return self.residual(t, q, v, a) + self.reactions(t, q, v, multipliers)
 
     def find_scales(self, t, q, v, a):
-        """Of differences, where a number has become ten times as large as all before"""
+        """Determines the scales of differences anew if a position or velocity is ten times as large as all before"""
         if np.all(np.abs(q) <= 10 * self.seen[0]) and np.all(np.abs(v) <= 10 * self.seen[1]):
             return
         self.seen = np.maximum(self.seen[0], np.abs(q)), np.maximum(self.seen[1], np.abs(v))
@@ -242,7 +242,8 @@ class _Problem:
         self.scale_v = scales(lambda x: self.residual(t, q, x, a), v)
 
     def check_gradient(self):
-        """A given Jacobian of the constraints beside differences at the begin: a wrong one makes wrong forces, which nothing else would show"""
+        """Compares a given Jacobian of the constraints with differences at the initial time: a wrong one causes wrong forces, which nothing else
+        would reveal"""
         given, found = self.gradient(self.t0, self.q0), differences(lambda x: self.constraints(self.t0, x), self.q0, self.m, self.scale_q)
         error = np.abs(given - found) * self.scale_q
         wrong = error > 1e-4 * np.max(np.maximum(np.abs(given), np.abs(found)) * self.scale_q, axis=1, keepdims=True)
@@ -252,23 +253,24 @@ class _Problem:
                              % (self.t0, row, column, given[row, column], found[row, column]))
 
     def check_jacobian(self):
-        """Given derivatives of the residual beside differences at the begin, where these are smooth: a wrong one by a makes wrong accelerations and multipliers, one by
-        q or v, which may be an approximation, makes many corrections and small steps. Terms like M(q) a are seen with accelerations that solve the equations there
-        by least squares, but for what velocities add."""
+        """Compares given derivatives of the residual with differences at the initial time, where the residual is smooth. Wrong derivatives by a
+        cause wrong accelerations and multipliers; wrong ones by q or v, which may be approximate, cause many corrections and small steps. In
+        order to test terms like M(q) a, the accelerations are those that solve the equations by least squares, without the terms of the
+        constraints that are quadratic in velocities."""
         t, q, v, still = self.t0, self.q0, self.v0, np.zeros(self.n)
         G = np.vstack([self.gradient(t, q), self.rate_gradient(t, q, v)])
         M = slopes(lambda x: self.residual(t, q, v, x), still, self.n)
         K, rest = np.block([[M, G.T], [G, np.zeros((len(G), len(G)))]]), self.residual(t, q, v, still)
         a = np.linalg.lstsq(K, np.concatenate([-rest, np.zeros(len(G))]), rcond=None)[0][:self.n] if np.all(np.isfinite(K)) else still
         given = self.given_matrices(t, q, v, a)
-        rounding = 1e-9 * (np.abs(rest) + np.abs(self.residual(t, q, v, a)))[:, None]  # of differences over 6e-6 of a scale
+        rounding = 1e-9 * (np.abs(rest) + np.abs(self.residual(t, q, v, a)))[:, None]  # rounding of differences with steps of 6e-6 of a scale
         by_a = lambda: slopes(lambda x: self.residual(t, q, v, x), a, self.n), np.maximum(1., np.abs(a)), np.ones((self.n, self.n), dtype=bool)
         by = [(lambda f=f, x=x, scale=scale: differences(f, x, self.n, scale), scale, smooth(f, x, 6e-6 * scale)) for f, x, scale in
               ((lambda x: self.residual(t, x, v, a), q, self.scale_q), (lambda x: self.residual(t, q, x, a), v, self.scale_v))]
         for name, one, (find, scale, judged) in (("a", given[2], by_a), ("q", given[0], by[0]), ("v", given[1], by[1])):
             try:
                 two = find()
-            except Exception:  # a residual that fails beside the state of the begin
+            except Exception:  # the residual fails near the initial state
                 continue
             wrong = judged & (np.abs(one - two) * scale > 1e-4 * np.max(np.maximum(np.abs(one), np.abs(two)) * scale, axis=1, keepdims=True) + rounding)
             wrong |= ~np.isfinite(one)
@@ -282,20 +284,20 @@ class _Problem:
             warnings.warn(text + "; corrections will converge slowly, and steps be short", RuntimeWarning, 5)
 
     def given_matrices(self, t, q, v, a):
-        """The three of jacobian()"""
+        """The three matrices that jacobian() returns, checked"""
         three = self._jacobian(t, q.copy(), v.copy(), a.copy(), *self.args)
         if not isinstance(three, (tuple, list, np.ndarray)) or len(three) != 3:
             raise ValueError("what jacobian() returns is %r, must be three matrices: the derivatives by q, v and a" % (three,))
         return [self._shaped(x, (self.n, self.n), "the matrix of derivatives by %s that jacobian() returns" % name) for name, x in zip("qva", three)]
 
     def massless(self):
-        """A remark about accelerations that the residual does not know at the begin, for messages"""
+        """A remark for messages about accelerations on which the residual does not depend at the initial time"""
         M = slopes(lambda x: self.residual(self.t0, self.q0, self.v0, x), np.zeros(self.n), self.n)
         names = ", ".join("a[%d]" % k for k in range(self.n) if not np.any(M[:, k]))
         return names and "; residual() does not depend on %s" % names
 
     def matrices(self, t, q, v, a, multipliers):
-        """Derivatives of the residual with the constraints' forces, by q, v, a"""
+        """Derivatives by q, v, a of the residual including the forces of the constraints"""
         self.find_scales(t, q, v, a)
         if self._jacobian is None:
             return (differences(lambda x: self.forces(t, x, v, a, multipliers), q, self.n, self.scale_q),
@@ -335,8 +337,8 @@ def _create(p, rtol, atol, max_step, first_step, start, trace):
 
 
 def _call(ts, p, keep):
-    """Equations that call Python. An exception of the user's ends the run by a residual that is not a number, and is raised when PETSc has returned: newer versions
-    of petsc4py (3.22) may crash where one is under way through PETSc."""
+    """Sets equations that call Python. After an exception of a user's function the residual is NaN, which ends the run; the exception is raised
+    when PETSc has returned, since newer versions of petsc4py (3.22) may crash if it is raised through PETSc."""
     n, rows = p.n, np.arange(p.size, dtype=PETSc.IntType)
 
     def caught(f, fail):
@@ -394,7 +396,7 @@ def _traced(f, what, *arguments):
 
 
 def _trace(ts, p, keep):
-    """Equations that run in C++: the residual with Phi_q^T lambda, and the entries of the three matrices that are not zero"""
+    """Sets traced equations that run in C++: the residual with Phi_q^T lambda, and the nonzero entries of the three matrices"""
     size, n = p.size, p.n
     leaf = [Expression("argument", (), k) for k in range(1 + 3 * size)]
     q, multipliers, v, a = leaf[1:1 + n], leaf[1 + n:1 + size], leaf[1 + size:1 + size + n], leaf[1 + 2 * size:1 + 2 * size + n]
@@ -426,10 +428,10 @@ def _solve(ts, p, output):
     except PETSc.Error as error:
         if p.error is not None:
             raise p.error from None
-        if error.__cause__ is not None:  # newer versions of petsc4py put their own error around one in a monitor of the user's
+        if error.__cause__ is not None:  # newer versions of petsc4py wrap an exception of a user's monitor in their own error
             raise error.__cause__
         lines = [line.split("] ", 1)[-1] for line in str(error).splitlines()]
-        if error.ierr != 91:  # PETSC_ERR_NOT_CONVERGED: the steps before are a result
+        if error.ierr != 91:  # after PETSC_ERR_NOT_CONVERGED the steps before are returned as the result
             raise Error(error.ierr, lines[-1] + p.massless(), lines[1:-1]) from None
         return -1, "the run has failed at t = %.6g: %s" % (ts.getTime(), lines[-1])
     if p.error is not None:  # with -ts_error_if_step_fails 0
@@ -452,7 +454,7 @@ def _reason(ts):
 # ---- output ----
 
 class _Output:
-    """What the steps leave behind"""
+    """Collects the output of the steps"""
 
     def __init__(self, problem, t_eval, dense, events):
         self.p, self.dense, self.stopped = problem, dense, None
@@ -475,7 +477,7 @@ class _Output:
             ts.setPostStep(self.look)
 
     def look(self, ts):
-        """After a step: passages are found on the method's own polynomials; the first terminal one ends the run"""
+        """Called after a step: finds passages with the interpolation of the integrator; the first terminal one ends the run"""
         for t, k in self.signs.passed(ts.getPrevTime(), ts.getTime(), lambda k, t: self.event_value(ts, t, k)):
             self.found[k][0].append(t)
             self.found[k][1].append(self.positions(ts, t)[0])
@@ -487,7 +489,7 @@ class _Output:
     def event_value(self, ts, t, k):
         q, v = self.positions(ts, t)
         x = self.events[k](t, q, v, *self.p.args)
-        x = float(x) - 0.5 if np.asarray(x).dtype == bool else float(x)  # a condition passes zero upwards where it becomes true
+        x = float(x) - 0.5 if np.asarray(x).dtype == bool else float(x)  # a condition passes zero upwards when it becomes true
         if np.isnan(x):
             raise ValueError("event %d is not a number at t = %g" % (k, t))
         return x
