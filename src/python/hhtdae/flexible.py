@@ -5,7 +5,7 @@
 >>> frame = scene.add("frame", hhtdae.FlexibleBody(body.modal(), damping=0.01))
 >>> scene.add("pin", hhtdae.Fixed(frame.attachment("hub").marker(), scene.ground.marker()))
 
-Arrays are those of this rank where a model is distributed. All functions that read, reduce or write are collective.
+If a model is distributed, arrays contain the part of this rank. All functions that read, reduce or write are collective.
 """
 
 import operator
@@ -41,19 +41,20 @@ class Material(NamedTuple):
 
 @dataclass
 class Attachment:
-    """Where joints and forces take hold of an FE model.
+    """A point of an FE model on which joints and forces act.
 
     Parameters
     ----------
     name : str
     set : str
-        Set of nodes; default: the one of the attachment's name.
+        Set of nodes; default: the set with the name of the attachment.
     tie : {"rigid", "average"}
-        The nodes follow the point as a rigid body (RBE2), or the point their weighted mean motion (RBE3).
+        "rigid": the nodes follow the point as a rigid body (RBE2); "average": the point follows the weighted mean motion of the nodes (RBE3).
     position : (3,), optional
         Default: the centroid of the nodes.
     weights : sequence of float, optional
-        Of an average, in the ascending order of the nodes' labels (`FeModel.label`), which is the same on any number of ranks; default: equal.
+        Weights of the nodes of an average, in ascending order of the nodes' labels (`FeModel.label`), for any number of ranks; default: equal
+        weights.
     """
     name: str
     set: str = ""
@@ -68,7 +69,7 @@ class Attachment:
 
 
 class Elements(NamedTuple):
-    """Of a mesh: types (list of str), material (n,), nodes (n, 20) by global number from 0 on, padded with -1; the order of nodes is Gmsh's."""
+    """Elements of a mesh: types (list of str), material (n,), nodes (n, 20) by global number from 0 on, padded with -1, in Gmsh's order."""
     types: List[str]
     material: np.ndarray
     nodes: np.ndarray
@@ -83,7 +84,7 @@ class Elements(NamedTuple):
 
 
 def _attachments(attachments):
-    """Their fields"""
+    """The fields of attachments, for the C++ part"""
     for a in [attachments] if isinstance(attachments, (str, Attachment)) else attachments:
         if not isinstance(a, Attachment) or a is attachments:
             raise TypeError("attachments are %r, must be a list of Attachment" % (attachments,))
@@ -100,15 +101,15 @@ class FeModel:
     Attributes
     ----------
     nodes, own, first : int
-        Nodes of all ranks; this rank has `own` of them from number `first` on.
+        Number of nodes on all ranks; this rank has `own` nodes, from number `first` on.
     coordinates : (own, 3)
     label : (own,)
-        Numbers of the nodes in the mesh or the other program.
+        Numbers of the nodes in the mesh file or in the program that made the model.
     sets : dict of str to array
         Own nodes of named sets, by global number.
     elements : Elements
     K, M : petsc4py.PETSc.Mat
-        Stiffness, free of supports, and mass.
+        Stiffness without supports, and mass.
     """
 
     def __init__(self, comm=None):
@@ -148,7 +149,7 @@ class FeModel:
         return model
 
     def add_set(self, name, nodes):
-        """A named set of own nodes, by global number from 0 on, or as an array of own, True or False, that says which."""
+        """Adds a named set of own nodes, given by global numbers from 0 on, or by an array (own,) of True and False."""
         x = np.asarray(nodes)
         if x.dtype == bool:
             if x.shape != (self.own,):
@@ -179,7 +180,7 @@ class FeModel:
 
 
 def _integers(x, what):
-    """A list of Python's integers"""
+    """Converts x to a list of Python's integers"""
     try:
         return [operator.index(n) for n in x]
     except TypeError:
@@ -187,7 +188,7 @@ def _integers(x, what):
 
 
 def _material(m, name):
-    """Three numbers"""
+    """The three numbers of a material, checked"""
     try:
         young, poisson, density = (float(x) for x in m)
     except (TypeError, ValueError):
@@ -201,7 +202,7 @@ def _matrix(A, name, comm):
     if not hasattr(A, "tocsr"):
         raise TypeError("%s is a %s, must be a sparse matrix of scipy (scipy.sparse.csr_matrix(%s)) or one of petsc4py" % (name, type(A).__name__, name))
     A = A.tocsr()
-    if not A.has_canonical_format:  # PETSc takes the last of several entries at one place, of which scipy means the sum
+    if not A.has_canonical_format:  # SciPy sums several entries at one place, while PETSc would take the last one
         A = A.copy()
         A.sum_duplicates()
     if np.iscomplexobj(A):
@@ -222,9 +223,9 @@ class ReducedBody:
     frequencies : (modes,)
         Of the modes, cycles per unit of time.
     residuals : (modes,)
-        A bound of each frequency's error, relative: there is an eigenvalue l of the full model with abs(omega^2 - l) <= residual l; negative: not known.
+        Relative error bounds of the frequencies: the full model has an eigenvalue l with abs(omega^2 - l) <= residual l; negative if not known.
     comm
-        Its nodes are distributed over these ranks.
+        The communicator over whose ranks the nodes are distributed.
     coordinates : (own nodes, 3); label : (own nodes,); elements : Elements
     shape : (own nodes, 3, modes)
         The modes at the nodes, if they were kept.
@@ -234,7 +235,7 @@ class ReducedBody:
 
     def __init__(self, core=None, comm=None):
         self._core = core if core is not None else _flexible.ReducedBody()
-        self.comm = PETSc.COMM_SELF if comm is None else comm  # its nodes are distributed over these ranks
+        self.comm = PETSc.COMM_SELF if comm is None else comm  # the communicator over whose ranks its nodes are distributed
 
     @classmethod
     def load(cls, file, comm=None):
@@ -244,7 +245,7 @@ class ReducedBody:
         return body
 
     def save(self, file):
-        """Writes the body into a file in HDF5."""
+        """Writes the body to an HDF5 file."""
         self._core.save(str(file))
 
     def __reduce__(self):
@@ -258,7 +259,7 @@ class ReducedBody:
                 return _unpickled, (whole.read(),)
 
     def modal(self):
-        """What a scene takes: the `model` of a `hhtdae.FlexibleBody`."""
+        """The body as the `model` of a `hhtdae.FlexibleBody`."""
         return self._core.modal()
 
     frequencies = property(lambda self: self._core.frequencies())
@@ -290,7 +291,7 @@ class ReducedBody:
         return self._core.von_mises(eta)
 
     def write_field(self, eta, file, origin=(0., 0., 0.), axes=None):
-        """Displacement, and stress where it is known, as a .vtu file for ParaView, moved by the pose of the FE model's axes."""
+        """Writes the displacement, and the stress where it is known, as a .vtu file for ParaView; origin, axes: pose of the FE model's axes."""
         self._core.write_field(eta, str(file), origin, np.eye(3) if axes is None else axes)
 
     def to_meshio(self, eta=None):
@@ -335,29 +336,31 @@ def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] =
     model : FeModel
     attachments : sequence of Attachment
     method : {"craig_bampton", "free_free", "static"}
-        Constraint modes and fixed-interface normal modes; normal modes of the unsupported body; constraint modes alone (Guyan).
+        "craig_bampton": constraint modes and fixed-interface normal modes; "free_free": normal modes of the unsupported body; "static":
+        constraint modes only (Guyan).
     modes : int or None
-        Normal modes, at most; None with `max_frequency`: all below it.
+        Largest number of normal modes; None with `max_frequency`: all below it.
     max_frequency : float
-        Of normal modes, cycles per unit of time; 0: no bound.
+        Largest frequency of normal modes, cycles per unit of time; 0: no bound.
     keep_below : float
-        Modes of the reduced pair that are kept, by frequency; 0: all.
+        Modes of the reduced eigenvalue problem up to this frequency are kept; 0: all.
     keep : sequence of int
-        Modes of the reduced pair that are kept, by number from 0 on; empty: all.
+        Numbers, from 0 on, of the modes of the reduced eigenvalue problem that are kept; empty: all.
     stiffening : bool
         Geometric stiffening by loads on attachments and by angular velocity.
     stress : bool
-        Stress modes as well.
+        Whether stress modes are computed.
     all_nodes : bool
-        The modes at all nodes are kept, for stress and pictures.
+        Whether the modes at all nodes are kept, for stress and pictures.
     node_sets, nodes : sequences of str and of int
-        Nodes that are kept for markers, forces and contact, by set and by label.
+        Sets, and labels, of nodes that are kept for markers, forces and contact.
     pressures : dict of load cases
-        ``{name: set}`` or ``{name: (set, follows)}``: pressure one on the outer faces whose nodes are all in the set; it follows the surface, or not.
+        ``{name: set}`` or ``{name: (set, follows)}``: unit pressure on the outer faces whose nodes are all in the set; follows: whether it
+        follows the surface.
     nodal_loads : dict of load cases
-        ``{name: {label: (fx, fy, fz)}}``. A load case of either kind brings no static (residual) vector into the modes: deflections under
-        it converge with their number. Where the static answer has to be exact, make an attachment of the loaded nodes (tie "average" stiffens nothing); kept
-        nodes alone do not help.
+        ``{name: {label: (fx, fy, fz)}}``. Load cases of both kinds add no static (residual) vector to the modes: deflections due to
+        them converge with the number of modes. If the static deflection has to be exact, make an attachment of the loaded nodes (tie "average"
+        adds no stiffness); kept nodes are not sufficient.
 
     Returns
     -------
@@ -380,7 +383,7 @@ def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] =
 
 
 def load_modal_body(file, comm=None):
-    """Only what a scene takes of a file of a reduced body."""
+    """Reads only the data that a scene needs from a file of a reduced body."""
     return _flexible.load_modal_body(_comm(comm), str(file))
 
 
@@ -408,17 +411,16 @@ class HotSpots:
         self._core.add(time, eta)
 
     def highest(self, count=5, distance=0.):
-        """The highest, no two nearer to each other than a distance: a list of `HotSpot`. Collective."""
+        """The nodes with the highest stress, no two closer than `distance`, as a list of `HotSpot`. Collective."""
         return [HotSpot(*s) for s in self._core.highest(count, distance)]
 
 
 @dataclass(eq=False)
 class FullBody:
-    """An FE model as a body of a scene, 3 coordinates a node, at the start.
+    """An FE model as a body of a scene with 3 coordinates for each node; initial pose and velocities.
 
-    law : "large" (St. Venant-Kirchhoff material, total Lagrangian; elements are integrated in full, also CalculiX's C3D20R, which become
-        some per cent stiffer than in K) or "small" (about the position at the start, from which
-        the body must not turn by more than a few degrees)
+    law : "large" (St. Venant-Kirchhoff material, total Lagrangian; elements are fully integrated, including CalculiX's C3D20R, which become
+        some per cent stiffer than in K) or "small" (linear, for rotations of the body from its initial attitude by at most a few degrees)
     position, rotation : of the origin and axes (columns) of the FE model, undeformed, space axes
     velocity : of the origin of the FE model, space axes; that of a `hhtdae.FlexibleBody` is of the centre of mass
     angular_velocity : space axes
@@ -435,8 +437,8 @@ class FullBody:
 
 
 class FullFeBody:
-    """A whole FE model in a scene of the same communicator; call it on all ranks in the same order as the scene's other parts. Pages show its surface, coloured by stress where its
-    elements have materials.
+    """A whole FE model in a scene with the same communicator; to be created on all ranks in the same order as the scene's other parts. Pages show
+    its surface, coloured by stress if its elements have materials.
     """
 
     def __init__(self, scene, name, model, body=FullBody()):
@@ -456,8 +458,8 @@ class FullFeBody:
         return Body(self._scene, self._core.attachment(name), "%s.%s" % (self.name, name))
 
     def positions(self, run, time=None):
-        """Positions of own nodes, (own, 3), space axes, at a time within the last step or where the run is (default): before the first step at the start,
-        after ``run.equilibrium()`` in equilibrium."""
+        """Positions of own nodes, (own, 3), in space axes, at a time within the last step; default: the present time of the run, which before the
+        first step is the start, or after ``run.equilibrium()`` the equilibrium."""
         return self._core.positions(run._open(), run.time if time is None else time)
 
     def write_field(self, run, file, time=None):

@@ -24,7 +24,7 @@ class SpringDamper(_Joint):
 
     stiffness : force per length, not negative
     damping : force per velocity, not negative
-    length : free length; negative: the distance where bodies are described, before they are assembled
+    length : free length; negative: the distance in the description, before assembly
     preload : tension at the free length"""
     stiffness: Number = 0.
     damping: Number = 0.
@@ -49,7 +49,7 @@ class TorsionalSpringDamper(_Joint):
 
     stiffness : moment per radian, not negative
     damping : moment per angular velocity, not negative
-    angle : free angle, radians; full turns count
+    angle : free angle, radians, with full turns
     preload : moment at the free angle"""
     stiffness: Number = 0.
     damping: Number = 0.
@@ -88,8 +88,9 @@ class Bushing(_Joint):
 
 @_spec
 class Beam(_Joint):
-    """Timoshenko beam without mass from j (x = 0) to i (x = length) along the markers' x axes; linear in its mean frame, for rotations of i
-    against j below half a turn: beyond it the torque has the wrong sign. Components: force and moment on i in the mean frame. Planar scenes need E, area and Izz alone.
+    """Massless Timoshenko beam from j (x = 0) to i (x = length) along the markers' x axes; linear in its mean frame, for rotations of i
+    relative to j below half a turn: beyond it the torque has the wrong sign. Components: force and moment on i in the mean frame. Planar scenes
+    need E, area and Izz only.
 
     length : negative: the distance at the start
     E, G : Young's modulus, shear modulus
@@ -113,12 +114,13 @@ class Beam(_Joint):
 
 @_spec
 class UserForce(Spec):
-    """Force and moment on i's body, formulas in the axes of a marker. Components: force, then moment. The error test sees a force where a step ends: one that acts
-    along a short piece of the way, where() of a position, wants steps shorter than that piece, options={"ts_adapt_dt_max": ...}.
+    """Force and moment on i's body, formulas in the axes of a marker. Components: force, then moment. Forces are evaluated at the ends of steps:
+    one that acts only on a short part of the path, as where() of a position does, requires steps shorter than that part,
+    options={"ts_adapt_dt_max": ...}.
 
     force, moment : three formulas each, or None
     frame : Marker, default: space axes
-    j may be None: no reaction"""
+    j : None if there is no reaction"""
     i: Any
     j: Any = None
     frame: Any = None
@@ -133,7 +135,7 @@ class UserScalarForce(_Joint):
     """A force along the line from j to i, repulsive when positive, or a moment about z_j on i's body. Component: its value.
 
     value : formula
-    rotational : bool, it is a moment"""
+    rotational : bool, whether it is a moment"""
     value: Formula
     rotational: bool = False
     state: bool = False
@@ -144,13 +146,13 @@ class UserScalarForce(_Joint):
 class ModalLoad(Spec):
     """A load case of a flexible body times a formula, in the axes of the body. Component: the scale.
 
-    Deflections converge with the number of modes. Where the static answer has to be exact, make an attachment of the loaded nodes, see
+    Deflections converge with the number of modes. If the static deflection has to be exact, make an attachment of the loaded nodes, see
     `hhtdae.flexible.reduce`.
 
     body : flexible Body
     load : name of the load case
     scale : formula
-    state : bool, the scale is an unknown of the equations, a force state"""
+    state : bool, whether the scale is an unknown of the equations, a force state"""
     body: Any
     load: str
     scale: Formula
@@ -168,8 +170,8 @@ class ContactLaw(Spec):
     friction : Coulomb's coefficient
     slip_velocity : of the regularization friction tanh(v / slip_velocity)
 
-    The numbers given are for metres, newtons and seconds; other units want others. Steps follow a contact as far as its penetration stands out of the tolerance:
-    if it does not, impacts gain or lose energy, and what is fast flies through."""
+    The default values are for metres, newtons and seconds. Steps resolve a contact only if its penetration is larger than the tolerance of positions:
+    otherwise impacts gain or lose energy, and fast bodies fly through each other."""
     stiffness: Number = 1e5
     exponent: Number = 1.5
     damping: Number = 0.
@@ -197,9 +199,9 @@ class NodeContact(Spec):
     """Kept nodes of a flexible body as balls against the xy plane of j, outside z_j > 0, or a sphere about j. Components: the resultant on the body, in space axes.
 
     body : flexible Body
-    nodes : labels; default: all that are kept
-    radius : of the balls; with a plane it may be zero
-    radius_j : of the sphere; 0: a plane"""
+    nodes : labels; default: all kept nodes
+    radius : of the balls; may be zero with a plane
+    radius_j : of the sphere; 0: the other shape is a plane"""
     body: Any
     j: Any
     nodes: Optional[Sequence[int]] = None
@@ -256,7 +258,7 @@ class SphereBox(_Joint):
 
 @_spec
 class RotationalStop(_Joint):
-    """Ends of the travel of the angle of i's x axis about z_j. Component: the moment on i's body.
+    """Limits of the angle of i's x axis about z_j. Component: the moment on i's body.
 
     lower, upper : radians, over full turns
     law : in moment and radians, without friction"""
@@ -268,7 +270,7 @@ class RotationalStop(_Joint):
 
 @_spec
 class TranslationalStop(_Joint):
-    """Ends of the travel of i along an axis of j. Component: the force on i's body.
+    """Limits of the displacement of i along an axis of j. Component: the force on i's body.
 
     lower, upper : lengths
     axis : 0, 1 or 2: x_j, y_j or z_j; in planar scenes the default is x_j, along which `Translational` is there
@@ -282,7 +284,7 @@ class TranslationalStop(_Joint):
 
 @_spec
 class DistanceStop(_Joint):
-    """Ends of the distance of the origins; with upper alone a rope. Component: the tension.
+    """Limits of the distance of the origins; with `upper` only, a rope. Component: the tension.
 
     lower, upper : lengths
     law : without friction"""

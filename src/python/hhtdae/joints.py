@@ -1,10 +1,10 @@
 """Joints, motions and primitive constraints between marker i and marker j.
 
-Multipliers are forces and moments on the body of marker i, row by row as each class tells: forces at i's origin unless it says otherwise, the opposite on j's
-body at the same point. x_j, y_j, z_j are the axes of marker j.
+Multipliers are forces and moments on the body of marker i, listed by each class in the order of the rows. Forces act at i's origin unless stated
+otherwise; the opposite loads act on j's body at the same point. x_j, y_j, z_j are the axes of marker j.
 
 Planar scenes have Revolute, Translational, Fixed, Gear, RackAndPinion, Coupler, GearMesh, RackMesh, PointDistance, PointOnCurve, RollingDisc, UserConstraint and the
-motions. z is normal to the plane there: what advances along z_j in space advances along x_j, and rows out of the plane are left out.
+motions. There z is normal to the plane: joints and motions that advance along z_j in space advance along x_j, and rows out of the plane are omitted.
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ class Universal(_Joint):
 
 @_spec
 class ConstantVelocity(_Joint):
-    """Origins coincide, rotations about z_i and z_j are equal; opposite if they are described more than 90 degrees apart, which stays so in the run. Multipliers: force
-    in space axes, then m, of which the moment is m cos(b / 2) about the axis halfway between z_i and z_j, b their angle: m about z_j where the shafts are in line."""
+    """Origins coincide, rotations about z_i and z_j are equal, or opposite if the described z axes enclose more than 90 degrees. Multipliers: force
+    in space axes, then m. The moment is m cos(b / 2) about the axis halfway between z_i and z_j, with b their angle; if the shafts are in line it
+    is m about z_j."""
 
 
 @_spec
@@ -81,16 +82,17 @@ class _Two(Spec):
 
 @_spec
 class Gear(_Two):
-    """Couples the angles of two joints: angle_1 + ratio angle_2 keeps its value at the start. Its torques are about the joints' axes; the forces of teeth, which
-    bearings feel, are those of `GearMesh`. Multiplier: the moment on the body of i1 about z_j1; that on the body of i2 is ratio times as large."""
+    """Couples the angles of two joints: angle_1 + ratio angle_2 keeps its initial value. Its torques are about the joints' axes; for tooth
+    forces, which load the bearings, use `GearMesh`. Multiplier: the moment on the body of i1 about z_j1; the moment on the body of i2 is ratio
+    times as large."""
     ratio: Number = 1.
 
 
 @_spec
 class RackAndPinion(_Two):
-    """Couples an advance along z_j2 (planar scenes: x_j2) with an angle about z_j1: advance_2 - radius angle_1 keeps its value at the start. The force of the teeth acts
-    along the axis of the advance, the torque about that of the angle; bearings feel those of `RackMesh`. Multiplier: the force on the rack, the body of i2; the moment
-    on the pinion, the body of i1, is -radius times it."""
+    """Couples an advance along z_j2 (planar scenes: x_j2) with an angle about z_j1: advance_2 - radius angle_1 keeps its initial value. The force
+    acts along the axis of the advance, the torque about the axis of the angle; for tooth forces, which load the bearings, use `RackMesh`.
+    Multiplier: the force on the rack, the body of i2; the moment on the pinion, the body of i1, is -radius times it."""
     radius: Number = 1.
 
 
@@ -105,8 +107,8 @@ class Term(Spec):
 
 @_spec
 class Coupler(Spec):
-    """The sum of two or three terms keeps its value at the start. Multiplier: the load on the body of a term's marker i, a moment about z_j or a force along the advance,
-    over the term's factor."""
+    """The sum of two or three terms keeps its initial value. Multiplier: the load on the body of a term's marker i, a moment about z_j or a force
+    along the advance, divided by the term's factor."""
     terms: Sequence[Term]
 
     def _described(self, scene, who):
@@ -119,14 +121,15 @@ class Coupler(Spec):
 
 @_spec
 class GearMesh(_Two):
-    """Teeth between two wheels on one carrier; the marker `mesh` on the carrier is at the pitch point, its z axis (planar scenes: x axis) along the
-    force of the teeth. Multiplier: the force on the body of i1 along it."""
+    """Teeth between two wheels on one carrier. The marker `mesh` on the carrier is at the pitch point, with its z axis (planar scenes: x axis)
+    along the tooth force. Multiplier: the force on the body of i1 along this axis."""
     mesh: Any
 
 
 @_spec
 class RackMesh(_Two):
-    """Teeth between wheel 1 and rack 2, which is on a translational joint along z_j2 (planar scenes: x_j2); `mesh` and multiplier as of `GearMesh`."""
+    """Teeth between wheel 1 and rack 2, which moves in a translational joint along z_j2 (planar scenes: x_j2); `mesh` and multiplier as in
+    `GearMesh`."""
     mesh: Any
 
 
@@ -169,7 +172,7 @@ class PointOnCurve(_Joint):
     planar scenes: along z x tangent, the tangent in the direction of the points.
 
     points : (n, 3)
-    closed : bool; an open curve goes on as a straight line beyond its ends"""
+    closed : bool; an open curve is extended by straight lines beyond its ends"""
     points: Sequence[Vector]
     closed: bool = False
 
@@ -202,9 +205,9 @@ class KnifeEdge(_Joint):
 
 @_spec
 class UserConstraint(Spec):
-    """Formulas that stay zero: of displacements, distances, angles and time, or of velocities too, in which they have to be linear. Multipliers: one a row; the load on the
-    bodies is that times the derivatives of the formula by positions, at velocity level by velocities. A row reads six markers and four angles at most,
-    and at velocity level, where they take no load, two variables and states."""
+    """Formulas that stay zero, of displacements, distances, angles and time, or also of velocities, in which they have to be linear. Multipliers:
+    one for each row; the load on the bodies is the multiplier times the derivatives of the formula by positions, at velocity level by velocities.
+    A row reads at most six markers and four angles, and, at velocity level, two variables and states, on which no load acts."""
     rows: Sequence[Formula]
     _functions = {"rows": _expressions}
 
@@ -218,7 +221,7 @@ class RotationalMotion(Spec):
     function : of time: a number, a `TimeFunction`, a formula of time(), or a Python function of t, which is traced; radians
     of : "displacement", "velocity" or "acceleration": what the function is
 
-    A velocity or acceleration that comes and goes while nothing else moves may lie between two steps, and what it leaves is lost: see `time`."""
+    A short pulse of velocity or acceleration while nothing else moves may lie between the ends of two steps and be missed: see `time`."""
     i: Any
     j: Any
     function: Union[float, TimeFunction, Expression, Callable]

@@ -1,6 +1,6 @@
-"""What can be read off the state: arguments of formulas, channels, and values of a snapshot.
+"""Measures, scalars that are computed from the state: arguments of formulas, channels, and values of a snapshot.
 
-Components are 0, 1, 2 or "x", "y", "z" of the marker `frame`; without one, of space axes.
+Components are 0, 1, 2 or "x", "y", "z" in the axes of the marker `frame`, or without it in space axes.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ __all__ = ["Measure", "acceleration", "angle", "angular_acceleration", "angular_
 
 
 class Measure(Expression):
-    """A scalar that can be read off the state of a scene."""
+    """A scalar that is computed from the state of a scene."""
 
     __slots__ = ()
 
@@ -50,16 +50,17 @@ def _row(k, name):
 def time():
     """Time.
 
-    Steps see loads at their ends: a pulse while nothing moves may lie between two of them if it is shorter than a fortieth of the run.
-    ``options={"ts_adapt_dt_max": 0.1}`` holds steps below a part of its duration, see `Scene.run`. A load that jumps at a time, as by `where`, costs velocities
-    the square root of the tolerance, with a step that ends there, too, since both steps beside the jump see the same side of it: a parameter that the action of
-    `Run.event` sets has both sides.
+    Loads are evaluated at the ends of steps: a pulse while nothing moves may lie between two of them if it is shorter than a fortieth of the run.
+    ``options={"ts_adapt_dt_max": 0.1}`` limits the step, which should be a part of the pulse's duration, see `Scene.run`. A load that jumps at a
+    time, as by `where`, causes an error of velocities of the order of the square root of the tolerance, even if a step ends at the jump, since
+    both adjacent steps evaluate the load on the same side of the jump. With a parameter that the action of `Run.event` sets, each step has the
+    right side.
     """
     return Measure("time")
 
 
 def displacement(i, component, j=None, frame=None):
-    """Component of the position of marker i from marker j (default: the space origin), length."""
+    """Component of the position of marker i relative to marker j (default: the origin of space), length."""
     return Measure("displacement", i, j, frame, _component(component))
 
 
@@ -74,7 +75,7 @@ def velocity(i, component, j=None, frame=None):
 
 
 def rate(i, j):
-    """Time derivative of the distance of two markers; 0 where they coincide, which has none there."""
+    """Time derivative of the distance of two markers; 0 if they coincide, where the distance has no derivative."""
     return Measure("rate", i, j)
 
 
@@ -84,10 +85,10 @@ def acceleration(i, component, j=None, frame=None):
 
 
 def angle(i, j):
-    """Angle of i's x axis about j's z axis from j's x axis, radians; in (-pi, pi] at the start, full turns are counted from there.
+    """Angle of i's x axis about j's z axis from j's x axis, radians; in (-pi, pi] at the start, from where full turns are counted.
 
-    In space that is so where an element, a variable, a state or a channel reads the angle. A snapshot or an event asks for it while the run goes: the first
-    question gets it in (-pi, pi], and turns are counted from there. Make a channel of an angle that is asked for later.
+    In spatial scenes this holds if an element, a variable, a state or a channel reads the angle. If only snapshots or events read it, the first
+    value is in (-pi, pi], and full turns are counted from then on. Make a channel of an angle that is read later.
     """
     return Measure("angle", i, j)
 
@@ -103,7 +104,8 @@ def angular_acceleration(i, component, j=None, frame=None):
 
 
 def multiplier(joint, row):
-    """Multiplier of a row, from 0 on, of a joint or motion: a force or a moment on the body of its marker i, along which axes its class says, row by row."""
+    """Multiplier of a row, from 0 on, of a joint or motion: a force or a moment on the body of its marker i; the class of the joint states the
+    axes of each row."""
     return Measure("multiplier", component=_row(row, "row"), target=_target(joint, "element"))
 
 
@@ -118,18 +120,19 @@ def joint_moment(joint, component, frame=None):
 
 
 def force(element, component=0):
-    """Component of a force element as its class says: tension, moment, force in some axes."""
+    """Component of a force element; its class states the components: tension, moment, force in some axes."""
     return Measure("force", component=_row(component, "component"), target=_target(element, "element"))
 
 
 def element_force(element, on, component, frame=None):
-    """Force of any element on the body of the marker `on` (default of frame: space axes); for channels and snapshots alone. An `Error` where the element does not act on
-    that body; `Snapshot.load` is zero there."""
+    """Force of any element on the body of the marker `on` (default of frame: space axes); only for channels and snapshots. An `Error` if the
+    element does not act on that body, in which case `Snapshot.load` is zero."""
     return Measure("element_force", on, None, frame, _component(component), _target(element, "element"))
 
 
 def element_moment(element, on, component, frame=None):
-    """Moment of any element on the body of the marker `on`, about its origin; for channels and snapshots alone. An `Error` where the element does not act on that body."""
+    """Moment of any element on the body of the marker `on`, about its origin; only for channels and snapshots. An `Error` if the element does not
+    act on that body."""
     return Measure("element_moment", on, None, frame, _component(component), _target(element, "element"))
 
 
@@ -144,18 +147,18 @@ def modal(body, mode):
 
 
 def kinetic_energy():
-    """Kinetic energy of the whole scene; for channels and snapshots alone."""
+    """Kinetic energy of the whole scene; only for channels and snapshots."""
     return Measure("kinetic_energy")
 
 
 def potential_energy():
-    """Potential energy of the whole scene, for channels and snapshots alone: of gravity, modes, FE models, SpringDamper, TorsionalSpringDamper, Bushing,
-    Beam, contacts and stops; users' functions and ground_acceleration() have none."""
+    """Potential energy of the whole scene, only for channels and snapshots: of gravity, modes, FE models, SpringDamper, TorsionalSpringDamper,
+    Bushing, Beam, contacts and stops. Users' functions and ground_acceleration() have none."""
     return Measure("potential_energy")
 
 
 def description(x, keep):
-    """What the C++ part takes of a formula: its measures, and a tape of them; None instead of a tape for a measure alone"""
+    """A formula for the C++ part: its measures, and a tape with these as arguments; None instead of a tape if the formula is a single measure"""
     from .expressions import _expression
     from .tracing import compile_tape, ordered
 

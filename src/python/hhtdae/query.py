@@ -21,7 +21,7 @@ Mode = _core.Mode
 
 @dataclass(eq=False)
 class Motion:
-    """Motion of a marker or body, all vectors in the axes asked for.
+    """Motion of a marker or body; all vectors are in the requested axes.
 
     position, velocity, acceleration : (3,), of the marker's origin or the body's centre of mass
     axes : (3, 3), its axes as columns
@@ -51,15 +51,16 @@ class Load:
 
 
 class Snapshot:
-    """The state of a run at a time of its last step, made by `Run.snapshot`: answers questions that nobody has asked for beforehand.
+    """The state of a run at a time of its last step, made by `Run.snapshot`: evaluates motions, loads and formulas that need not have been
+    declared before.
 
-    Accelerations and multipliers at a time within a step are those that belong to positions and velocities there, which costs about a factorization; at
-    the end of a step they are the step's own, at no cost and with an error many times as large, as a rule. With fast modes that hardly anything damps, of
-    flexible bodies above all, it is the other way round: what the interpolation of positions misses comes out in accelerations and reactions within the
-    step times the square of the highest frequency. Then ask at the ends of steps, or lower the tolerance.
+    Accelerations and multipliers at a time within a step follow from the equations of motion with the interpolated positions and velocities, at
+    the cost of about a factorization. At the end of a step they are those of the step, at no cost and usually with an error many times as large.
+    With fast, weakly damped modes, above all of flexible bodies, the opposite is true: accelerations and reactions within the step contain the
+    error of the interpolated positions times the square of the highest frequency. Then take snapshots at the ends of steps, or lower the tolerance.
 
-    An angle of a scene in space that no element and no channel reads between the same two markers (`Body.marker` makes a new one each time) is in (-pi, pi] where it is first asked for, and full turns are
-    counted from there: make a channel of it, see `angle`. All calls are collective.
+    In spatial scenes, an angle that no element and no channel reads between the same two markers (`Body.marker` makes a new one each time) is in
+    (-pi, pi] when it is first read, and full turns are counted from then on: make a channel of it, see `angle`. All calls are collective.
     """
 
     def __init__(self, run, time=None, later=False):
@@ -70,7 +71,7 @@ class Snapshot:
 
     @one_thread
     def take(self, time=None):
-        """Takes another time (default: the end of the last step)."""
+        """Moves the snapshot to another time (default: the end of the last step)."""
         self._core.take(self._run._open(), None if time is None else number(time, "time"))
         return self
 
@@ -80,7 +81,7 @@ class Snapshot:
         return self._core.time()
 
     def motion(self, of, axes=None):
-        """`Motion` of a marker, seen from space, in the axes of another one (default: space); or of a body: its centre of mass and axes."""
+        """`Motion` of a marker relative to space, in the axes of another marker (default: space); or of a body: its centre of mass and axes."""
         from .scene import Marker
 
         if isinstance(of, Marker):
@@ -90,13 +91,13 @@ class Snapshot:
         return Motion(**self._core.body(of))
 
     def relative_motion(self, marker, to):
-        """`Motion` of a marker that somebody on another one sees, in the axes of that one."""
+        """`Motion` of a marker relative to the marker `to`, as an observer moving with `to` sees it, in its axes."""
         return Motion(**self._core.relative(marker, to))
 
     def load(self, element, on, axes=None):
-        """`Load`: what a joint, motion or force does to the body of the marker `on`, zero where it does not act on it; the moment about that marker's origin, in the axes of
-        another marker (default: space). Of a flexible body: to the attachment that the marker is on, or by ``ModalLoad`` and ``NodeContact``, which have no attachment, to all
-        of it; `Error` if the element touches another attachment alone."""
+        """`Load` of a joint, motion or force on the body of the marker `on`, zero if it does not act on it; the moment is about that marker's
+        origin, both are in the axes of another marker (default: space). For a flexible body it is the load on the attachment of the marker, or,
+        for ``ModalLoad`` and ``NodeContact``, which have no attachment, on the whole body; `Error` if the element acts on another attachment only."""
         return Load(*self._core.load(element, on, axes))
 
     def modes(self, body):
@@ -143,7 +144,7 @@ class BodyPart:
 
 @dataclass(eq=False)
 class StateSpace:
-    """z' = A z + B f, y = C z + D f in minimal coordinates; unpacks as A, B, C, D, which is what scipy.signal.StateSpace takes."""
+    """z' = A z + B f, y = C z + D f in minimal coordinates; unpacks as A, B, C, D, the arguments of scipy.signal.StateSpace."""
     A: np.ndarray
     B: np.ndarray
     C: np.ndarray
@@ -155,7 +156,7 @@ class StateSpace:
 
 @dataclass(eq=False)
 class Excitation:
-    """An input of a linearization, by what the value 1 of it is: made by `force`, `torque`, `motion` or `ground_acceleration`."""
+    """An input of a linearization, defined by the excitation for the input value 1; made by `force`, `torque`, `motion` or `ground_acceleration`."""
     at: object = None
     load: Tuple[float, float, float] = (0., 0., 0.)
     moment: Tuple[float, float, float] = (0., 0., 0.)
@@ -174,12 +175,12 @@ class Excitation:
 
     @classmethod
     def motion(cls, element):
-        """An addition of 1 to the function of a motion element, in its units: a shaken base."""
+        """An addition of 1, in its unit, to the function of a motion element, for example a shaken base."""
         return cls(driven=element)
 
     @classmethod
     def ground_acceleration(cls, vector):
-        """An acceleration (3,) of the ground, relative to which all coordinates are."""
+        """An acceleration (3,) of the ground; all coordinates are relative to the ground."""
         return cls(ground=vector)
 
     def _tuple(self):

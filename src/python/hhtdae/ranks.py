@@ -1,4 +1,4 @@
-"""An exception on one rank ends the work of all ranks: at the next point where they meet, as an error on all of them; else by MPI_Abort."""
+"""Exceptions on one rank: `together` raises an error on all ranks; uncaught exceptions end all ranks by MPI_Abort."""
 
 import os
 import sys
@@ -12,8 +12,9 @@ PETSC_ERR_USER = 83
 
 
 def together(comm, function, *arguments):
-    """function(*arguments), which all ranks call at the same point: if one rank fails there, the others raise `Error` with its text. Without it they would wait
-    for that rank for ever in their next collective call. What the function itself does collectively has to be done, or not, by all ranks. Collective."""
+    """Calls function(*arguments) on all ranks: if it raises an exception on one rank, the others raise `Error` with its text. Without this they
+    would wait forever for that rank in their next collective call. Collective calls within the function must be made by all ranks or by none.
+    Collective."""
     if comm.size == 1:
         return function(*arguments)
     result = error = None
@@ -30,13 +31,14 @@ def together(comm, function, *arguments):
 
 
 def end_all_ranks_with_one():
-    """An exception that nobody has caught ends all ranks of COMM_WORLD by MPI_Abort, after its traceback was printed, as ``python -m mpi4py`` does: the others
-    may wait for that rank in a collective call, and MPI does not end before all ranks do. Interactive sessions go on."""
+    """Sets `sys.excepthook` so that an uncaught exception ends all ranks of COMM_WORLD by MPI_Abort after its traceback was printed, as ``python
+    -m mpi4py`` does: the other ranks may wait for that rank in a collective call, and MPI programs end only when all ranks do. Interactive
+    sessions continue."""
     before, process = sys.excepthook, os.getpid()
 
     def hook(kind, error, trace):
         before(kind, error, trace)
-        if os.getpid() == process and not hasattr(sys, "ps1") and not sys.flags.interactive:  # not in a copy of the process
+        if os.getpid() == process and not hasattr(sys, "ps1") and not sys.flags.interactive:  # not in a forked process
             sys.stdout.flush()
             sys.stderr.flush()
             _core.abort(1)

@@ -1,4 +1,4 @@
-"""How a scene comes into another process: the function that has described it is called there with the same arguments."""
+"""Pickling of scenes: in another process the function that describes the scene is called with the same arguments."""
 
 import functools
 from typing import Any, Callable, NamedTuple, Tuple, TypeVar
@@ -11,10 +11,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def model(function: Function) -> Function:
-    """Marks a function of a module that describes a scene, so that the scene can be pickled: for processes of `multiprocessing`, for files.
+    """A decorator for a function of a module that describes a scene, so that the scene can be pickled, for `multiprocessing` or for files.
 
-    The function returns the scene, or a tuple with the scene in it. Pickled are its arguments as they were given (lists,
-    dictionaries, arrays and data classes are copied), present values of parameters, and the settings of `Scene.start` and `Scene.output`; the scene is described anew where it is unpickled. Bodies, markers, elements and formulas of it can be pickled along.
+    The function returns the scene, or a tuple that contains the scene. Its arguments are pickled as they were given (lists,
+    dictionaries, arrays and data classes are copied), with the present values of parameters and the settings of `Scene.start` and `Scene.output`;
+    unpickling describes the scene anew. Bodies, markers, elements and formulas of the scene can be pickled together with it.
 
     >>> @hhtdae.model
     ... def oscillator(mass=1.):
@@ -41,7 +42,7 @@ def model(function: Function) -> Function:
 
 
 class State(NamedTuple):
-    """What changes of a scene that is described"""
+    """The pickled data of a scene: how to describe it, and what can be changed after that"""
     describe: Callable[..., Any]
     args: Tuple[Any, ...]
     keywords: dict
@@ -51,7 +52,7 @@ class State(NamedTuple):
 
 
 class Recipe:
-    """Kept by the scene that it has made"""
+    """The describing function and its arguments; stored in the scene that it has described"""
 
     def __init__(self, describe, args, keywords):
         self.describe, self.args, self.keywords = describe, copied(args), copied(keywords)

@@ -1,4 +1,4 @@
-"""What a run leaves: channels as arrays, a frame of pandas, pictures, a page. It can be pickled."""
+"""Results of a run, which can be pickled: channels as arrays, a data frame of pandas, plots, a page."""
 
 import html
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ __all__ = ["Page", "Results"]
 
 
 def optional(module: str, what: str, package: str = "") -> Any:
-    """A module that only some users need; ImportError says what for and where it comes from"""
+    """Imports an optional module; the message of ImportError says what it is needed for and which package contains it"""
     import importlib
 
     try:
@@ -25,14 +25,14 @@ def optional(module: str, what: str, package: str = "") -> Any:
 class Page:
     """A run in three dimensions, with its channels, in one HTML document that needs no network; made by `Run.page`.
 
-    A notebook shows it below the cell whose last line it is. It is kept with the notebook: half a megabyte, and what the frames take.
+    As the last line of a notebook's cell it is shown below the cell. The notebook stores it: half a megabyte plus the frames.
     """
 
     def __init__(self, text: str, height: int = 600) -> None:
         self.html, self.height = text, height
 
     def save(self, file: Any) -> None:
-        """Writes it into a file, for any browser."""
+        """Writes the page to a file, for any browser."""
         with open(file, "w", encoding="utf-8") as out:
             out.write(self.html)
 
@@ -68,14 +68,14 @@ class Channels:
         return self.values[:, names.index(name)].copy()
 
     def frame(self):
-        """The channels as a pandas data frame over time; units are in its `attrs`."""
+        """The channels as a pandas data frame with the time as index; units are in its `attrs`."""
         pandas = optional("pandas", "frame()")
         frame = pandas.DataFrame(self.values, columns=[n for n, _ in self._signature], index=pandas.Index(self.times, name="time"))
         frame.attrs["units"] = self.units
         return frame
 
     def plot(self, *names: str, axes: Any = None) -> np.ndarray:
-        """Channels over time by matplotlib, all if none are named; returns the axes, one for each unit."""
+        """Plots channels over time by matplotlib, all if none are named; returns the axes, one for each unit."""
         plt = optional("matplotlib.pyplot", "plot()")
         chosen = [(n, u) for n, u in self._signature if not names or n in names]
         unknown = set(names) - {n for n, _ in chosen}
@@ -96,13 +96,13 @@ class Channels:
 
 @dataclass(eq=False, repr=False)
 class Results(Channels):
-    """What a run leaves in memory, made by `Run.results`; a run that is pickled comes back as this.
+    """The results of a run in memory, made by `Run.results`; a pickled run is unpickled as its results.
 
     Attributes
     ----------
     times : (n,); values : (n, channels)
     time : float
-        Where the run was.
+        The time that the run had reached.
     steps : int
     statistics : Statistics
     """
