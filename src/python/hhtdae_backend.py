@@ -1,4 +1,4 @@
-"""Builds the wheel for pip (PEP 517) by CMake, from the source tree that this file lies in; with the standard library alone.
+"""Builds the wheel for pip (PEP 517) by CMake, from the source tree that contains this file; uses only the standard library.
 
     pip install ./src/python                       compiles in a temporary directory
     pip install --config-settings builddir=build ./src/python
@@ -30,7 +30,7 @@ def _version():
 
 
 def _environment():
-    """pip hides installed packages, petsc4py too, from builds by a PYTHONPATH of its own. They are what this one is for."""
+    """The environment without the PYTHONPATH by which pip hides installed packages from builds: this build needs the installed petsc4py."""
     environment = dict(os.environ)
     if "pip-build-env" in environment.get("PYTHONPATH", ""):
         del environment["PYTHONPATH"]
@@ -45,14 +45,14 @@ def _run(*command):
 
 
 def _petsc():
-    """Major and minor number of petsc4py, with which the modules have to be used"""
+    """Major and minor number of the petsc4py for which the modules are built"""
     out = _run(sys.executable, "-c", "import petsc4py; print(petsc4py.__version__)").split()[-1]
     major, minor = (int(x) for x in out.split(".")[:2])
     return "petsc4py>=%d.%d,<%d.%d" % (major, minor, major, minor + 1)
 
 
 def _configure(build, settings):
-    """A build tree that is there already is taken as it is, unless there are settings"""
+    """Configures the build tree; an existing one is not configured again unless there are settings"""
     given = ["-D%s=%s" % (name, value) for name, value in settings.items() if name != "builddir"]
     if os.path.exists(os.path.join(build, "CMakeCache.txt")):
         if given:
@@ -66,7 +66,7 @@ def _configure(build, settings):
 
 @contextlib.contextmanager
 def _installed(settings):
-    """A directory with what CMake installs"""
+    """Builds, and installs to a directory; returns it"""
     if not os.path.exists(os.path.join(TREE, "CMakeLists.txt")):
         raise SystemExit("%s is no source tree of hhtdae: pip before 21.3 copies the directory that it builds" % TREE)
     with tempfile.TemporaryDirectory(prefix="hhtdae-") as folder:
@@ -80,14 +80,14 @@ def _installed(settings):
 
 
 def _contents(prefix):
-    """(name in the wheel, file)"""
+    """The contents of the wheel, as pairs (name in the wheel, file)"""
     package, = [folder for folder, _, files in os.walk(prefix) if os.path.basename(folder) == NAME and "__init__.py" in files]
     for name in sorted(os.listdir(package)):
         if os.path.isfile(os.path.join(package, name)):
             yield "%s/%s" % (NAME, name), os.path.join(package, name)
     for folder, _, files in os.walk(prefix):
         for name in sorted(files):
-            if re.fullmatch(r"libhht\w+\.so\.\d+", name):  # by this name the loader looks for it
+            if re.fullmatch(r"libhht\w+\.so\.\d+", name):  # the name for which the loader looks
                 yield "%s/lib/%s" % (NAME, name), os.path.join(folder, name)
 
 

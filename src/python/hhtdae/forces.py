@@ -71,8 +71,9 @@ class NonlinearTorsionalSpring(_Joint):
 @_spec
 class Bushing(_Joint):
     """Six springs and dampers in j's axes: force f_0 - K d - C v, moment m_0 - K_t phi - C_t w on i's body about i's origin, for displacements d and
-    small rotations phi of i in j; in general m_0 - K_t phi is multiplied by 1 + [phi]/2 + ..., which makes the bushing conservative. Rotations stay below half a turn: beyond it the moment has the wrong sign, also in planar scenes (a TorsionalSpringDamper counts
-    turns). Components: force and moment on i in j's axes.
+    small rotations phi of i relative to j; in general m_0 - K_t phi is multiplied by 1 + [phi]/2 + ..., which makes the bushing conservative.
+    Rotations must stay below half a turn: beyond it the moment has the wrong sign, also in planar scenes (a TorsionalSpringDamper counts turns).
+    Components: force and moment on i in j's axes.
 
     stiffness, torsional_stiffness : (3,), force per length, moment per radian, not negative
     damping, torsional_damping : (3,), force per velocity, moment per angular velocity, not negative

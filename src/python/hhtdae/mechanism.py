@@ -84,35 +84,38 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
         well: Psi_v^T mu.
     jacobian : callable, optional
         jacobian(t, q, v, a, *args) returns the derivatives of the residual by q, v and a, three matrices (n, n), arrays or sparse ones of SciPy. Default: central
-        differences, 6 n + 1 calls of `residual` for each Newton matrix. Given ones are compared with differences at the begin: a wrong one by a is an error, since
-        accelerations and multipliers follow from it, one by q or v that is not exact a warning.
+        differences, 6 n + 1 calls of `residual` for each Newton matrix. Given ones are compared with differences at the initial time: a wrong
+        derivative by a is an error, since accelerations and multipliers follow from it; an inexact one by q or v causes a warning.
     constraint_jacobian : callable, optional
-        constraint_jacobian(t, q, *args) returns Phi_q, (m, n), an array or a sparse matrix of SciPy. Default: central differences, with which a given one is compared at the begin.
+        constraint_jacobian(t, q, *args) returns Phi_q, (m, n), an array or a sparse matrix of SciPy. Default: central differences, with which a
+        given one is compared at the initial time.
     rtol, atol : float
-        Relative and absolute tolerance of the error of positions in every step, max(atol, rtol times the largest value so far). The error of the whole solution is larger: the method is of order two, its steps go as tol^(1/3), errors as tol^(2/3);
-        where forces jump at unknown times, as tol^(1/2).
+        Relative and absolute tolerance of the error of positions in every step, max(atol, rtol times the largest value so far). The error of the
+        whole solution is larger: the method is of order two, its steps are proportional to tol^(1/3), its errors to tol^(2/3), or to tol^(1/2) if
+        forces jump at unknown times.
     t_eval : sequence of float, optional
-        Times of the output, increasing; default: the ends of steps. Accelerations and multipliers solve the equations of motion between the ends of steps;
-        at the ends they are the step's own, with an error many times as large.
+        Times of the output, increasing; default: the ends of steps. Between the ends of steps accelerations and multipliers solve the equations
+        of motion; at the ends they are those of the step, with an error many times as large.
     dense_output : bool
         `sol`, a function of time.
     events : callable or list of them, optional
-        event(t, q, v, *args) returns a number whose changes of sign from one step to the next are sought, or a truth value, which passes upwards where it becomes
-        true: two zeros within a step are not seen, see `max_step`; with the attributes `terminal` (bool) and `direction` (-1, 0, 1) as in SciPy.
+        event(t, q, v, *args) returns a number whose zeros are found by its sign at the ends of steps, or a truth value, which passes upwards when
+        it becomes true. Two zeros within a step are not found, see `max_step`. Functions may have the attributes `terminal` (bool) and
+        `direction` (-1, 0, 1) as in SciPy.
     max_step, first_step : float, optional
         Longest step, and the first one; the first is found otherwise.
     args : tuple
         Further arguments of all functions.
     trace : bool
-        The residual and the constraints are called once, with formulas, and run in C++ with exact derivatives, some ten times faster: for functions that
-        consist of operators, numpy's elementary functions, array products and `hhtdae.where`, and depend on their arguments alone. Functions
-        that cannot be traced raise TypeError.
+        The residual and the constraints are called once, with formulas as arguments, and then run in C++ with exact derivatives, some ten times
+        faster. This is possible for functions that consist of operators, numpy's elementary functions, array products and `hhtdae.where`, and
+        depend on their arguments only. Functions that cannot be traced raise TypeError.
     start : {"project", "report", "off"}
-        About initial values that violate the constraints: "project" moves them to the nearest consistent ones; "report" prints how far away these are, and
-        begins with those given; "off" begins with those given and prints nothing. Rows in what is printed are those of the residual, behind them those of the constraints. A run
-        from positions that violate them fails as a rule.
+        What happens with initial values that violate the constraints. "project": they are moved to the nearest consistent ones; "report": the
+        distance to these is printed, and the run begins with the given values; "off": the run begins with the given values. In messages the rows
+        of the residual come first, then those of the constraints. A run from positions that violate the constraints usually fails.
     options : dict, optional
-        PETSc's options without the dash; those of the command line win.
+        PETSc's options without the dash; options of the command line have precedence.
 
     Returns
     -------

@@ -25,7 +25,7 @@ __all__ = ["Run"]
 
 
 class _Given:
-    """Options that are in PETSc's database for the time being, and which of them have been asked for"""
+    """Options that are temporarily in PETSc's database, and which of them have been queried"""
 
     def __init__(self):
         self.values, self.used = {}, set()
@@ -41,13 +41,14 @@ class _Given:
             PETSc.Options().delValue(name)
 
 
-_given = []  # the innermost last
+_given = []  # nested temporary options, the innermost last
 
 
 @contextmanager
 def temporary_options(given):
-    """PETSc's options while something is done; what the user has set already stays. Yields a list that has the names of those that were not asked for after it.
-    Those of a run within which this is done, by one of its callbacks, are away meanwhile."""
+    """A context in which PETSc's database contains the given options; options that the user has set have precedence. Yields a list that, after
+    the context, has the names of those that were not queried. If the context is entered by a callback of a run, the temporary options of that run
+    are removed meanwhile."""
     own, unused, outer = _Given(), [], _given[-1] if _given else _Given()
     outer.take()
     _given.append(own)
@@ -63,7 +64,7 @@ def temporary_options(given):
 
 
 def tell_unused(names, level):
-    """A warning about given options that nothing has asked for: misspelt ones as a rule"""
+    """Warns of given options that were not queried, usually misspelt ones"""
     if names:
         warnings.warn("nobody has asked for the options %s: are their names right?" % ", ".join("-" + name for name in names), RuntimeWarning, level + 1)
 
@@ -76,8 +77,8 @@ def positive(x, name):
 
 
 def collect_garbage(comm):
-    """Destroys PETSc's objects of a communicator that Python has dropped: petsc4py keeps them until all ranks ask for it, since Python's
-    garbage collector does not come on all ranks at once. Collective."""
+    """Destroys PETSc's objects of a communicator that Python has released: petsc4py keeps them until all ranks call this, since Python's
+    garbage collector does not run at the same time on all ranks. Collective."""
     if hasattr(PETSc, "garbage_cleanup"):
         PETSc.garbage_cleanup(comm)
 
@@ -85,16 +86,17 @@ def collect_garbage(comm):
 class Run(Channels):
     """A run of a scene, made by `Scene.run` or `Scene.solve`.
 
-    It is a PETSc time stepper, `ts`, with all of petsc4py: ``run.ts.getSNES().getKSP()``. Channels are arrays by name: ``run["tip"]`` at
-    the times ``run.times``. Runs are independent of each other, and outlive changes of their scene. As a context manager the run is closed at the
-    end of the block, which frees its memory; that of a run which is dropped is freed when the next one is made. What it leaves, `results`, can be
-    pickled; a run that is pickled comes back as that.
+    Its PETSc time stepper is `ts`, a TS of petsc4py: ``run.ts.getSNES().getKSP()``. Channels are arrays by name: ``run["tip"]`` at
+    the times ``run.times``. Runs are independent of each other and of later changes of their scene. As a context manager the run is closed at the
+    end of the block, which frees its memory; the memory of a run without references is freed when the next run is made. Its `results` can be
+    pickled; a pickled run is unpickled as its results.
 
-    On several ranks an exception of a callback, an event's action or an `on_step` function on one rank ends the run on all ranks: that rank raises it, the others
-    `Error` with its text. Functions that call collective methods call them on all ranks alike. An exception that a script does not catch ends all ranks.
+    On several ranks an exception of a callback, an event's action or an `on_step` function on one rank ends the run on all ranks: that rank
+    raises it, the others raise `Error` with its text. Functions that call collective methods must do so on all ranks. An exception that a script
+    does not catch ends all ranks.
 
-    PETSc is for one thread at a time: while a run is made, solved or asked in one thread, the same in another thread, of this run or any other, is a RuntimeError.
-    What a run calls back is in its thread. For runs side by side use processes, ``multiprocessing.Pool().map(job, values)``.
+    PETSc is for one thread at a time: while one thread makes, solves or queries a run, doing so in another thread, with this run or any other, is
+    a RuntimeError. Callbacks of a run are called in its thread. For parallel runs use processes, ``multiprocessing.Pool().map(job, values)``.
 
     Attributes
     ----------
@@ -112,11 +114,11 @@ class Run(Channels):
         if tolerance is not None:
             tolerance = positive(tolerance, "tolerance")
         self._options, self._events, self._signs, self._passed = dict(options or {}), [], Signs(), []
-        self._now = None  # a snapshot for the formulas of events
+        self._now = None  # a snapshot with which formulas of events are evaluated
         self._before, self._numbers = None, None  # state, and parameters, at the last event before its actions
-        self._ended = False  # by a terminal event in the last solve()
-        self._serial = 0  # calls of TSSolve(), each of which shows its first state to monitors
-        self._solving = False  # while solve() is under way: what it calls back must neither solve nor close the run
+        self._ended = False  # whether a terminal event has ended the last solve()
+        self._serial = 0  # number of calls of TSSolve(); each calls monitors with its initial state first
+        self._solving = False  # whether solve() is running: its callbacks must neither solve nor close the run
         collect_garbage(scene.comm)
         with temporary_options(self._options) as self._unused:
             self.ts = scene._core.create_ts(after._open() if after is not None else None)
@@ -133,7 +135,7 @@ class Run(Channels):
             _core.set_from_options(self.ts)
 
     def _open(self):
-        if not self.ts:  # also one that was destroyed by hand
+        if not self.ts:  # the TS may also have been destroyed by the user
             raise ValueError("the run has been closed")
         return self.ts
 
@@ -144,7 +146,7 @@ class Run(Channels):
 
     @one_thread
     def solve(self, until: float) -> "Run":
-        """Goes on to the time `until`; returns the run. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
+        """Continues the run to the time `until`; returns the run. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
         self._not_solving("solve")
         ts = self._open()
         until = number(until, "solve(): until")
@@ -172,8 +174,9 @@ class Run(Channels):
         return self
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
-        """Goes on to `until` in parts of dt, and yields the time after each: a controller changes parameters between them, after which the integrator's history
-        begins anew, from the nearest positions that meet motions of displacement and user constraints with the new values. A terminal event ends it, after its time.
+        """Continues the run to `until` in intervals of dt, and yields the time after each of them. A controller may change parameters in between;
+        the integrator then restarts from the nearest positions that satisfy prescribed displacements and user constraints with the new values. A
+        terminal event ends the iteration after the time of the event.
 
         >>> for t in run.step_by(0.01, until=5):
         ...     torque.set(-gain * run.snapshot().value(error))
@@ -194,23 +197,25 @@ class Run(Channels):
                 return
 
     def event(self, formula, action: Any = None, terminal: bool = False, direction: int = 0) -> None:
-        """Calls `action` where a formula passes through zero. Passages are found by the signs at both ends of each step: of two passages within one step none is found, so keep steps
-        short by the option -ts_adapt_dt_max. The step ends at the passage, and the integrator's history begins anew; velocities that joints
-        forbid are lost as in a plastic impact, unless the option -ts_hhtdae_start says otherwise. Channels, files and `on_step` see the step end there, before
-        the action; that an action makes a velocity jump through zero is no passage.
+        """Calls `action` when a formula passes through zero. Passages are found by the signs at both ends of each step: two passages within one
+        step are not found, so limit the step by the option -ts_adapt_dt_max. The step is shortened to end at the passage, where the integrator
+        restarts. Velocities that violate joints are removed as in a plastic impact, unless the option -ts_hhtdae_start is given. Channels, files
+        and `on_step` functions treat the passage as the end of a step, before the action. A velocity that jumps through zero because of an action
+        is not a passage.
 
         Parameters
         ----------
         formula : Expression
-            A measure, or a formula of measures; a condition, as ``x < 0.3``, passes upwards where it becomes true. Full turns of an `angle` that no element and
-            no channel reads between the same two markers are counted from this call's time on or later: make a channel of it.
+            A measure, or a formula of measures; a condition such as ``x < 0.3`` passes upwards when it becomes true. Full turns of an `angle`
+            that no element and no channel reads between the same two markers are counted from the time of this call on or later: make a channel
+            of it.
         action : callable, optional
-            action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``. If it changes what a callback
-            does, it has to call `restart`.
+            action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``. If it changes the
+            behaviour of a callback, it has to call `restart`.
         terminal : bool
-            The run ends there.
+            Whether the run ends at the passage.
         direction : {0, 1, -1}
-            Passages of both kinds, upwards, or downwards alone.
+            0: all passages, 1: only upwards, -1: only downwards.
         """
         if direction not in (-1, 0, 1):
             raise ValueError("event(): direction is %r, must be 0, 1 or -1" % (direction,))
@@ -236,8 +241,8 @@ class Run(Channels):
         return value
 
     def _look(self, ts):
-        """After a step, before monitors see it: where something passes zero the step is taken back to the first passage, which ends TSSolve(). So outputs
-        see it end there."""
+        """Called after a step, before the monitors: if a formula passes zero, the TS is moved back to the first passage, and TSSolve() ends. So
+        outputs have a step that ends there."""
         self._passed = self._signs.passed(ts.getPrevTime(), ts.getTime(), self._event_value)
         if self._passed:
             integrator.move_back(ts, self._passed[0][0])
@@ -255,13 +260,13 @@ class Run(Channels):
         self._numbers = self._present_parameters()
 
     def _changed(self):
-        """Whether the state or a parameter is not what it was at the last event"""
+        """Whether the state or a parameter has changed since the last event"""
         if self._numbers is None or self._numbers != self._present_parameters():
             return True
         return not all([x.equal(y) for x, y in zip(self._open().getSolution2(), self._before)])
 
     def _solve_to_events(self):
-        """From event to event; the first one may come while the run is under way"""
+        """Solves from event to event; the first event may be added by a callback during the solve"""
         while True:
             ts = self._open()  # an action may have destroyed it
             if self._events and self._changed():
@@ -270,7 +275,7 @@ class Run(Channels):
             self._serial += 1
             self.scene._core.solve(ts)
             self._project_restarts()
-            if not self._passed or ts.getTime() < self._passed[0][0]:  # or it lies behind a final time that was interpolated
+            if not self._passed or ts.getTime() < self._passed[0][0]:  # or the passage is after a final time that was interpolated
                 return
             time = self._passed[0][0]
             here = [k for t, k in self._passed if t == time]
@@ -286,29 +291,30 @@ class Run(Channels):
                 return
 
     def _project_restarts(self):
-        """Interpolated velocities, with which a step begins after an event, meet the constraints as the step's tolerance goes, and positions do not meet a constraint whose
-        parameter has been set. That holds for all restarts of a run with events or such constraints that has begun, so that it goes on from a checkpoint as it has
-        gone on itself: test Checkpoints of test_events.py."""
+        """Makes restarts project the initial values: interpolated velocities at an event satisfy the constraints only up to the tolerance of the
+        step, and positions do not satisfy a constraint whose parameter has been changed. This is done for all restarts of a run with events or
+        such constraints, so that a run resumed from a checkpoint continues as the original one: test Checkpoints of test_events.py."""
         if (self._events or self.scene._constraints_jump) and not PETSc.Options().hasName("ts_hhtdae_start"):
             integrator.set_start(self._open(), "project")
 
     def restart(self) -> None:
-        """Begins the integrator's history anew. To be called after a callback or a parameter has made a force or motion jump."""
+        """Restarts the integrator, which then uses no values of earlier steps. To be called after a callback or a parameter has made a force or
+        motion jump."""
         self._numbers = None
         self._open().restartStep()
         if self.steps:
             self._project_restarts()
 
     def on_step(self, function: Callable[["Run"], Any]) -> None:
-        """Calls function(run) after every step. Where it sets parameters that make a formula jump, it has to call `restart`."""
-        begun, me = 0, weakref.ref(self)  # its TS must not hold the run, see _look_of()
+        """Calls function(run) after every step. If the function sets parameters that make a formula jump, it has to call `restart`."""
+        begun, me = 0, weakref.ref(self)  # the TS must not have a reference to the run, see _look_of()
 
         def monitor(ts, step, t, u):
             nonlocal begun
             run = me()
             if run is None:
                 return
-            first, begun = begun != run._serial, run._serial  # the state that a part of the run begins with
+            first, begun = begun != run._serial, run._serial  # the initial state of a part of the run is not the end of a step
             if step > 0 and not first:
                 together(run.scene.comm, function, run)
         self._open().setMonitor(monitor)
@@ -320,24 +326,25 @@ class Run(Channels):
 
     @one_thread
     def equilibrium(self, time: Any = None) -> "Run":
-        """Moves the run to static equilibrium at a time, at rest; returns the run. States whose values nothing reads, integrals for later use, keep them.
-        Initial values that violate constraints need ``scene.start(assembly="project")`` before the run is made, or "off": bodies then go
-        from where they are described. Collective."""
+        """Moves the run to static equilibrium at a time, at rest; returns the run. States that no equation reads, such as integrals for output,
+        keep their values. If initial values violate constraints, call ``scene.start(assembly="project")`` before the run is made, or with "off":
+        then the iteration starts from the described positions. Collective."""
         _core.static_equilibrium(self._open(), self._at(time))
         return self
 
     @one_thread
     def assemble(self, time: Any = None) -> "Run":
-        """Moves it to the nearest positions and velocities that meet all constraints and motions at a time; returns the run. Those of the start have to
-        meet them, or are moved by ``scene.start(assembly="project")`` where the run is made."""
+        """Moves the run to the nearest positions and velocities that satisfy all constraints and motions at a time; returns the run. The initial
+        values have to satisfy them at the start, unless ``scene.start(assembly="project")`` moves them when the run is made."""
         _core.assemble_at(self._open(), self._at(time))
         return self
 
     @one_thread
     def kinematics(self, time: Any = None) -> "Run":
-        """As `assemble`, for scenes whose motions and joints leave no freedom: loads of a snapshot are those of inverse dynamics. Returns the run.
+        """As `assemble`, for scenes without degrees of freedom beside joints and motions: loads of a snapshot are those of inverse dynamics.
+        Returns the run.
 
-        >>> scene.start(assembly="project")  # velocities that motions ask for need not be given
+        >>> scene.start(assembly="project")  # velocities that follow from motions need not be given
         >>> scene.run().kinematics(0.5).snapshot().load(drive, marker)
         """
         _core.kinematics(self._open(), self._at(time))
@@ -357,7 +364,7 @@ class Run(Channels):
 
     @property
     def statistics(self) -> integrator.Statistics:
-        """Counts of the run, see `hhtdae.Statistics`."""
+        """Counters of the run, see `hhtdae.Statistics`."""
         return integrator.statistics(self._open())
 
     @property
@@ -380,7 +387,7 @@ class Run(Channels):
 
     @property
     def results(self) -> Results:
-        """What the run has left until now, as arrays of its own: also of a closed run."""
+        """The results of the run until now, as separate arrays; also available for a closed run."""
         time, steps, statistics = (self.time, self.steps, self.statistics) if self.ts is not None else self._left
         return Results(self.times, self.values, time, steps, statistics, list(self._signature), self._page.text())
 
@@ -389,7 +396,7 @@ class Run(Channels):
         return Results, tuple(vars(left).values())
 
     def page(self, height: int = 600) -> Page:
-        """The run until now in three dimensions, if frames were asked for by ``Scene.run(page=True)``: a notebook shows it below the cell.
+        """The run until now in three dimensions, if ``Scene.run(page=True)`` has recorded frames; a notebook shows it below the cell.
 
         >>> scene.solve(2., page=True).page()
 
@@ -408,27 +415,29 @@ class Run(Channels):
         return Snapshot(self, time)
 
     def linearize(self, time: Any = None, axes: Any = None) -> Linearization:
-        """Small motions about the state at a time of the last step: in equilibrium, at rest without accelerations, or steady as seen from the body `axes`, from
-        flexible bodies or from space; in any other state `modes()` and `state_space()` alone: see `Linearization`. Collective."""
+        """Small motions about the state at a time of the last step: an equilibrium, a state at rest without accelerations, or a motion that is
+        steady relative to the body `axes`, to flexible bodies or to space. In any other state only `modes()` and `state_space()` are valid, see
+        `Linearization`. Collective."""
         return Linearization(self, time, axes)
 
     # ---- the rest ----
 
     @one_thread
     def save(self, file: str) -> None:
-        """Writes a checkpoint, with which the run can be resumed bit for bit. Collective."""
+        """Writes a checkpoint, from which the run can be resumed with bitwise identical results. Collective."""
         integrator.checkpoint_save(self._open(), file)
 
     @one_thread
     def load(self, file: str) -> "Run":
-        """Takes the run to a checkpoint of a run of the same scene, from where it goes on bit for bit; returns the run. Collective.
+        """Moves the run to the state in a checkpoint of a run of the same scene, from where it continues with bitwise identical results; returns
+        the run. Collective.
 
         Parameters must have the values with which the checkpoint was written; afterwards `Scene.set` may change them.
         """
         ts = self._open()
         self._not_solving("load")
         with temporary_options(self._options):
-            _core.set_up(ts)  # before it, the file's name would only be noted
+            _core.set_up(ts)  # before the set-up, checkpoint_load() would only store the name of the file
             integrator.checkpoint_load(ts, file)
             self._project_restarts()
         if self._recorder:
@@ -437,7 +446,7 @@ class Run(Channels):
 
     @one_thread
     def close(self) -> None:
-        """Frees what PETSc has for the run; its samples stay. While the run is being solved this is an error."""
+        """Destroys the TS of the run and frees its memory; samples remain available. This is an error while the run is being solved."""
         if self.ts:
             self._not_solving("close")
             self._left = self.time, self.steps, self.statistics
@@ -455,7 +464,8 @@ class Run(Channels):
 
 
 def _look_of(run):
-    """The run's look after a step, for its TS, which must not hold the run: the snapshot holds the TS, out of sight of Python's garbage collector"""
+    """The function that calls the run's _look() after a step. The TS has only a weak reference to the run: the run's snapshot has a reference to
+    the TS that Python's garbage collector does not know"""
     def look(ts):
         alive = run()
         if alive is not None:
@@ -464,13 +474,13 @@ def _look_of(run):
 
 
 def _remove(folder, process):
-    """Not in copies of the process, which have a copy of the run"""
+    """Removes a temporary directory, except in forked processes, which have a copy of the run"""
     if os.getpid() == process:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 class _PageFile:
-    """Where a run writes its page: the user's file, or one of its own that goes with the run"""
+    """The file to which a run writes its page: the user's file, or a temporary one that is removed with the run"""
 
     def __init__(self, scene, page: Union[bool, str]):
         self.scene, self.span, self.begun, self.temporary = scene, None, False, page is True
@@ -484,7 +494,7 @@ class _PageFile:
 
     @contextmanager
     def settings(self):
-        """The scene's, with this file, where the run is first solved; options of the command line come after them"""
+        """The settings of output when the run is first solved: those of the scene, with this file; options of the command line have precedence"""
         given = self.scene._output
         own = dict(given)
         if self.file:
@@ -501,7 +511,7 @@ class _PageFile:
             self.scene._set_page(given)
 
     def text(self) -> Optional[str]:
-        """None: there is none, or not on this rank"""
+        """The text of the page; None if there is none, or not on this rank"""
         if not self.begun or not self.file or self.scene.comm.rank or not os.path.exists(self.file):
             return None
         with open(self.file, encoding="utf-8") as page:

@@ -1,4 +1,4 @@
-"""Multibody scenes: the description, of which runs are made."""
+"""Multibody scenes: descriptions from which runs are made."""
 
 import operator
 import os
@@ -24,7 +24,7 @@ __all__ = ["Body", "Element", "Marker", "Scene", "State", "Variable"]
 
 
 class _Handle:
-    """Refers to a part of a scene; its name is what results and messages call it"""
+    """Refers to a part of a scene; results and messages use its name"""
 
     __slots__ = ("_id", "_number", "_scene", "name")
 
@@ -40,7 +40,7 @@ class _Handle:
 
     @classmethod
     def _of(cls, scene, number, name):
-        """Where the scene has come from another process: scenes are numbered anew there"""
+        """The handle in an unpickled scene, which has another number than the pickled one"""
         return cls(scene, (number, scene.ground._number), name)
 
 
@@ -51,11 +51,11 @@ class Body(_Handle):
     _kind = "body"
 
     def marker(self, position: Sequence[float] = (0., 0., 0.), axes: Any = None, name: str = "") -> "Marker":
-        """A marker on the body; position and axes (columns) in body axes from the body's origin; of the ground in space axes."""
+        """A marker on the body; position relative to the body's origin and axes (columns) are in body axes, for the ground in space axes."""
         return self._scene._marker(self, position, axes, name, False)
 
     def marker_at(self, position: Sequence[float], axes: Any = None, name: str = "") -> "Marker":
-        """The same, given where it is at the start, in space axes."""
+        """A marker on the body, given by its position and axes at the start, in space axes."""
         return self._scene._marker(self, position, axes, name, True)
 
     def attachment(self, name: str) -> "Body":
@@ -64,12 +64,12 @@ class Body(_Handle):
         return Body(self._scene, self._scene._core.attachment(self, name), "%s.%s" % (self.name, name))
 
     def node(self, label: int) -> "Body":
-        """The same at a node that the reduction has kept, by its number in the FE model."""
+        """The frame at a node that the reduction has kept, by the node's number in the FE model."""
         self._scene._describe()
         return Body(self._scene, self._scene._core.node(self, label), "%s.node %d" % (self.name, label))
 
     def shape(self, shape: Shape) -> "Body":
-        """Draws the body in animations and pages."""
+        """Adds a shape with which the body is drawn in animations and pages."""
         if not isinstance(shape, Shape):
             raise TypeError("a shape of %s is %r, must be Shape.box(half), Shape.cylinder(radius, length) or Shape.sphere(radius)" % (self.name, shape))
         self._scene._describe("a shape of %s" % self.name)
@@ -77,8 +77,9 @@ class Body(_Handle):
         return self
 
     def surface(self, body: Any, stress_unit: str = "") -> "Body":
-        """Draws a flexible body in pages by the surface of its mesh, deformed, and coloured by stress where the `hhtdae.flexible.ReducedBody` has stress
-        modes; it must have kept its elements and the modes at all nodes, and be on one rank or on those of the scene. Collective."""
+        """Draws a flexible body in pages by the deformed surface of its mesh, coloured by stress if the `hhtdae.flexible.ReducedBody` has stress
+        modes. The reduced body must have kept its elements and the modes at all nodes, and be on one rank or on the ranks of the scene.
+        Collective."""
         from . import flexible
 
         self._scene._describe("a surface of %s" % self.name)
@@ -113,16 +114,16 @@ class State(_Handle):
 class Scene:
     """A multibody scene: bodies, markers, joints, motions, forces.
 
-    Units are the user's own, but consistent; angles are in radians. What is wrong with a scene is reported by name, all of it at once, when its first
-    run is made. Under MPI every rank describes the same scene in the same order.
+    Units are chosen by the user and must be consistent; angles are in radians. All errors of a description are reported at once, with the names
+    of the parts, when the first run is made. Under MPI every rank describes the same scene in the same order.
 
     Parameters
     ----------
     gravity : (3,), optional
         Acceleration of gravity, space axes; formulas of parameters have to be given by `set_gravity`.
     planar : bool
-        Bodies move in the xy plane: 3 coordinates, position and angle about z. Forces along z and moments about x and y are none: constants of a `UserForce` that say
-        otherwise are an error, about gravity along z a notice is printed.
+        Bodies move in the xy plane: 3 coordinates, position and angle about z. Forces along z and moments about x and y are ignored; nonzero
+        constants for these in a `UserForce` are an error, and gravity along z causes a notice.
     comm : petsc4py or mpi4py communicator
         Default: the world's.
 
@@ -141,16 +142,16 @@ class Scene:
         if not isinstance(planar, (bool, np.bool_)):
             raise TypeError(f"Scene: planar must be True or False, not {planar!r}")
         self._core = _core.Scene(self.comm, bool(planar))
-        self._keep = [self.comm]  # what the C++ part refers to and does not own: callbacks and functions that describe
+        self._keep = [self.comm]  # objects to which the C++ part has borrowed references: callbacks and describing functions
         self._channels = []
         self._parameters = {}
         self._states = self._bodies = self._elements = self._variables = 0
         self._moving = []  # numbers of bodies in the scene, and whether they are flexible
         self._gravity = (0., 0., 0.)
-        self._begun = False  # whether there is more than parameters
-        self._edits = 0  # calls that have described something
-        self._constraints_jump = False  # whether positions that constraints ask for depend on parameters
-        self._fixed = False  # from the first set-up that has succeeded
+        self._begun = False  # whether anything but parameters has been described
+        self._edits = 0  # number of calls that have described something
+        self._constraints_jump = False  # whether positions that satisfy the constraints depend on parameters
+        self._fixed = False  # true from the first successful set-up on
         self._recipe: Optional[Recipe] = None
         self._start = dict(assembly="report", redundant="drop", rotations="local", equilibrium=False, view=False, tolerance=1e-6, time=0., angle_tol=0.)
         self._output = dict(file="", csv="", dt=0., animation="", animation_dt=0., balance=False, page="", page_title="", page_dt=0.,
@@ -160,7 +161,8 @@ class Scene:
             self.set_gravity(gravity)
 
     def _describe(self, late=None):
-        """Every call that describes something begins with this; `late`: what it is called where it can only come before the set-up"""
+        """Called first by every function that describes something; late: name of the part for the error message if it cannot be added after the
+        set-up"""
         if self._fixed and late is not None:
             raise RuntimeError("%s came too late: the scene is fixed from its set-up or first run on, and stays as it was. Describe it before, or make another scene; a formula "
                                "can be asked of any run by Snapshot.value()" % late)
@@ -175,8 +177,9 @@ class Scene:
     # ---- description ----
 
     def parameter(self, name: str, value: float) -> Parameter:
-        """A number that may be another one in the next run. Parameters come before everything else but gravity and `ground_acceleration`. Returns a `Parameter`, which
-        stands for a number anywhere in the description. Its name is one that no other parameter has."""
+        """A number that may have another value in the next run. Parameters must be made before everything else except gravity and
+        `ground_acceleration`. Returns a `Parameter`, which can be given for any number of the description. Its name must be unique among
+        parameters."""
         if self._begun:
             raise ValueError("parameter %s came too late: parameters are made before everything else but gravity and the ground's acceleration" % name)
         text(name, "Scene.parameter()")
@@ -185,20 +188,21 @@ class Scene:
         return p
 
     def set(self, **values: float) -> None:
-        """Gives parameters other values. Collective.
+        """Changes the values of parameters. Collective.
 
-        What the description was made of counts for runs that are made from now on; runs that were made before keep what they had. Formulas of the state and callbacks,
-        which read parameters as they are evaluated, follow at once, in all runs: runs side by side with different values there need scenes of their own.
-        So do `Run.snapshot`, `Run.sample` and `Run.linearize` at the present time, whose forces, accelerations and reactions are then those with which the run goes on.
-        Between parts of a run, in `Run.on_step` and in actions of events where a value makes a formula jump call `Run.restart`: steps across a jump lose accuracy.
-        `Run.step_by` does so by itself. Where motions of displacement or user constraints depend on parameters, positions are moved there to the nearest that meet them.
+        Numbers of the description change for runs made from now on; existing runs keep the old ones. Formulas of the state and callbacks,
+        which read parameters when they are evaluated, change at once in all runs: simultaneous runs with different values there need separate scenes.
+        `Run.snapshot`, `Run.sample` and `Run.linearize` at the present time change, too; their forces, accelerations and reactions are then those
+        with which the run continues. If a value makes a formula jump between parts of a run, in `Run.on_step` or in actions of events, call
+        `Run.restart`: steps across a jump lose accuracy. `Run.step_by` does so by itself. If prescribed displacements or user constraints depend
+        on parameters, the restart moves positions to the nearest that satisfy them.
         """
         values = {name: number(value, "parameter " + name) for name, value in values.items()}
-        for name in sorted(values, key=lambda name: name in self._parameters):  # all or none: one that there is not is an error before others are set
+        for name in sorted(values, key=lambda name: name in self._parameters):  # all or none are set: unknown names come first and raise an error
             self._core.set(name, values[name])
 
     def set_gravity(self, acceleration: Sequence[Any]) -> None:
-        """Acceleration of gravity, (3,) in space axes; it may have formulas of parameters."""
+        """Sets the acceleration of gravity, (3,) in space axes, which may contain formulas of parameters."""
         described = has_formula(acceleration, self, "gravity")
         begun = self._begun
         self._describe("gravity")
@@ -223,12 +227,13 @@ class Scene:
         Parameters
         ----------
         name : str
-            For messages and results. It is one that no other body, or no other element, has; an empty one becomes "body 7", "spring damper 3", which is the `name` of
-            what is returned.
+            For messages and results; unique among bodies, or among elements. An empty name is replaced by one such as "body 7" or "spring damper
+            3", which is the `name` of the returned object.
         what : RigidBody, PointMass, FlexibleBody, one of the elements, or a function without arguments that returns one
-            A function is called again whenever parameters have changed. One of an element may return None: the element has its place, and nothing
-            acts; its markers are made outside of it, as others are an error. Within a run, `run(after=)`, elements that count angles over full turns or follow curves
-            cannot come or go: couplers, gears, torsion springs, constraints of angles. Numbers that are formulas of parameters need no function.
+            A function is called again whenever parameters have changed. A function that describes an element may return None: the element then
+            exists but does nothing. It must not make markers; its markers are made before. When a run continues another one, `run(after=)`,
+            elements that count full turns or follow curves cannot be added or removed: couplers, gears, torsion springs, constraints of angles.
+            Numbers that are formulas of parameters need no function.
 
         Returns
         -------
@@ -239,7 +244,7 @@ class Scene:
             name = name or self._unnamed(type(what))
             described, converted = self._converted(what, name)
             if described:
-                what = copied(what)  # the caller's may be another one when parameters change
+                what = copied(what)  # the caller may have changed it when parameters change
             given = self._later(lambda: what._fields(converted)) if described else what._fields(converted)
             self._keep.append((what, converted))
             return self._enter(name, what, given)
@@ -253,7 +258,7 @@ class Scene:
         return self._enter(name, first, self._later(lambda: self._fields_of(what(), type(first), name)))
 
     def _unnamed(self, kind):
-        """What a part without a name is called"""
+        """The name of a part for which none was given"""
         if issubclass(kind, (RigidBody, PointMass, FlexibleBody)):
             return "body %d" % self._bodies
         return "%s %d" % (re.sub("(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower(), self._elements)
@@ -266,7 +271,7 @@ class Scene:
         return what._fields(self._converted(what, name)[1])
 
     def _converted(self, what, name):
-        """Whether it depends on parameters, and its functions"""
+        """Whether a description depends on parameters, and its converted functions"""
         keep, who = [], "%s %s" % (type(what).__name__, name)
         described, converted = what._described(self, who), what._convert(keep, who)
         self._keeps(keep, who)
@@ -275,7 +280,7 @@ class Scene:
         return described, converted
 
     def _keeps(self, keep, who):
-        """Keeps what formulas refer to"""
+        """Checks parameters and stores references to the objects that formulas use"""
         check_parameters(keep, self, who)
         self._keep.extend(keep)
 
@@ -299,7 +304,7 @@ class Scene:
             raise TypeError("Scene.add(%r): a %s is no body, joint, motion or force" % (name, kind.__name__))
         element = Element(self, self._core.element(known, name, given), name)
         self._elements += 1
-        self._states += getattr(what, "of", None) == "acceleration"  # a motion that is given by its acceleration has a state, its speed
+        self._states += getattr(what, "of", None) == "acceleration"  # a prescribed acceleration adds a state, the speed of the motion
         return element
 
     def _later(self, function):
@@ -328,7 +333,8 @@ class Scene:
         return self.add(name, PointMass(**fields))
 
     def connect(self, name: str, joint: Type[Spec], i: Body, j: Body, point: Sequence[float], axis: Sequence[float] = (0., 0., 1.), **fields: Any) -> Element:
-        """A joint of bodies i and j at a point of space, with markers on both, z along an axis of space: for all joints that two markers alike describe.
+        """A joint of bodies i and j at a point of space; makes coincident markers on both bodies with z along an axis of space. For joints that
+        are described by two such markers.
 
         >>> scene.connect("pin", hhtdae.Revolute, arm, scene.ground, (0, 0, 0), axis=(0, 0, 1))
         """
@@ -337,7 +343,7 @@ class Scene:
         return self.add(name, joint(i.marker_at(point, axes), j.marker_at(point, axes), **fields))
 
     def variable(self, name: str, definition: Formula, initial: float = 0.) -> Variable:
-        """A user-defined variable: an unknown V = formula. Names are as of `add`."""
+        """A user-defined variable: an unknown V = formula. Names are as in `add`."""
         name = text(name, "Scene.variable()") or "variable %d" % self._variables
         initial = number(initial, "variable %s: its initial value" % name)
         self._describe("variable " + name)
@@ -346,7 +352,8 @@ class Scene:
         return variable
 
     def state(self, name: str, rate: Union[Formula, Callable[[Expression], Expression]], initial: float) -> State:
-        """A first-order state: x' = formula. The formula may be a function of one argument, of which it gets the state's own value: ``lambda x: -x``. Names are as of `add`."""
+        """A first-order state: x' = formula. The formula may be a function of one argument, the value of the state: ``lambda x: -x``. Names are
+        as in `add`."""
         name = text(name, "Scene.state()") or "state %d" % self._states
         initial = number(initial, "state %s: its initial value" % name)
         self._describe("state " + name)
@@ -358,7 +365,7 @@ class Scene:
         return state
 
     def states(self, names: Sequence[str], rates: Callable[[Sequence[Expression]], Sequence[Formula]], initial: Sequence[float]) -> List[State]:
-        """States that refer to one another, as those of an observer: x' = rates(x), of as many values as there are names:
+        """Coupled first-order states, for example of an observer: x' = rates(x), with as many values as names:
         ``scene.states(["x", "v"], lambda x: [x[1], -4 * x[0]], [1., 0.])``."""
         names, initial = list(names), list(initial)
         values = [Measure("state", target=State(self, (self._states + k, self.ground._number), name)) for k, name in enumerate(names)]
@@ -371,7 +378,7 @@ class Scene:
         return [self.state(*each) for each in zip(names, formulas, initial)]
 
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
-        """A result that runs record under a name: a measure, or a formula of measures and parameters, with the unit for tables."""
+        """A result that runs record under a name: a measure, or a formula of measures and parameters; unit: for tables and plots."""
         text(name, "Scene.channel()")
         self._describe("channel " + name)
         self._core.channel(name, self._formula(value, "channel " + name), unit)
@@ -383,61 +390,65 @@ class Scene:
         self._core.line(list(markers))
 
     def start(self, **policy):
-        """How runs start that are made from now on; options of the command line and those of `run` come after it. Runs that were made before keep what they had; where
-        it is another start than that of the last run, the next one sets the scene up again.
+        """Sets how runs made from now on start; options of the command line and of `run` have precedence. Existing runs do not change. If the
+        settings differ from those of the last run, the next run sets the scene up again.
 
         Parameters
         ----------
         assembly : {"report", "off", "project"}
-            About initial values that violate the constraints: an error that names the elements; nothing, they are left to the run's own start (option
-            ``ts_hhtdae_start``); or "project": bodies and velocities move to the nearest consistent ones in the metric of the masses. Bodies move as rigid ones
-            first. What rigid motions cannot meet, a press fit or a motion that drives one end of a clamped beam, flexible bodies deform for when the run is
-            made: velocities become those after a plastic impact, positions are strained near the attachments, most in whole bodies, until
-            `Run.equilibrium` relaxes them. A whole finite-element body (`hhtdae.flexible.FullFeBody`) is not moved as a rigid one: attachments go where joints and
-            motions want them, and its other nodes stay where, and as fast as, ``FullBody(position=, velocity=, angular_velocity=)`` has put them, so that it is strained
-            and vibrates unless these meet the joints. ``fixed_start`` holds a body; joints that hang together with one are met by rigid motions alone.
+            What happens with initial values that violate the constraints. "report": an error that names the elements; "off": nothing, the option
+            ``ts_hhtdae_start`` of the run determines it; "project": positions and velocities are moved to the nearest consistent ones in the
+            metric of the masses. First all bodies move as rigid ones. If this is not sufficient, as for a press fit or a motion that drives one
+            end of a clamped beam, flexible bodies deform when the run is made: velocities become those after a plastic impact, and bodies, most
+            of all whole ones, are strained near the attachments until `Run.equilibrium` relaxes them. A whole finite-element body
+            (`hhtdae.flexible.FullFeBody`) is not moved as a rigid one: its attachments move to satisfy joints and motions, while its other nodes
+            keep positions and velocities given by ``FullBody(position=, velocity=, angular_velocity=)``, so that it is strained and vibrates
+            unless these satisfy the joints. Bodies with ``fixed_start`` do not move; joints of mechanisms that contain one are satisfied by rigid
+            motions only.
         tolerance : float
-            Of misfits, times the size of the largest mechanism (bodies that joints hang together, and their markers) for lengths; radians.
+            Largest accepted violation: radians for angles, relative to the size of the largest mechanism (bodies connected by joints, and their
+            markers) for lengths.
         redundant : {"drop", "refuse", "keep"}
-            About constraints that say the same thing twice.
+            What happens with redundant constraints.
         equilibrium : bool
             The run starts at rest in static equilibrium.
         view : bool
-            Prints what the start has done.
+            Whether the results of the start are printed.
         time : float
-            Of the initial values.
+            Time of the initial values.
         rotations : {"local", "euler313"}
             Coordinates of the rotations of bodies in space.
         angle_tol : float
-            Of the error test for rotations, radians; 0: the tolerance of the run, as of lengths, which in small units is too small a number for angles.
+            Tolerance of the error test for rotations, radians; 0: the tolerance of the run, as for lengths, which is too small a number for
+            angles if lengths are small numbers in their unit.
         """
         chosen = self._choose(self._start, policy, "start", assembly=("report", "off", "project"), redundant=("drop", "refuse", "keep"), rotations=("local", "euler313"))
         self._core.start(*[chosen[k] for k in ("assembly", "redundant", "rotations", "equilibrium", "view", "tolerance", "time", "angle_tol")])
         self._start = chosen
 
     def output(self, **settings):
-        """Files of results, beside what runs keep in memory.
+        """Sets files of results, in addition to the channels that runs keep in memory.
 
         Parameters
         ----------
         file, csv : str
-            Channels in HDF5, and as a table.
+            Files of the channels in HDF5, and as a CSV table.
         dt : float
-            Between samples; 0: the end of every step.
+            Time between samples; 0: the end of every step.
         animation : str
             Prefix of the animation's files for ParaView.
         animation_dt : float
-            Between frames; 0: every step.
+            Time between frames; 0: the end of every step.
         balance : bool or str
-            Energy and momentum at every step: printed, or into a file.
+            Energy and momentum at every step: True: printed; a name: written to this file.
         page : str
             HTML file that shows the run in three dimensions, with its channels, in any browser.
         page_title : str
             Default: the file's name.
         page_dt : float
-            Between its frames; 0: `page_frames` of them up to the time that `Run.solve` first goes to.
+            Time between frames of the page; 0: `page_frames` frames up to the end time of the first `Run.solve`.
         page_frames, page_nodes : int
-            Frames, and nodes that are shown of whole finite-element bodies, at most.
+            Number of frames, and largest number of nodes shown of whole finite-element bodies.
         """
         chosen = self._choose(self._output, settings, "output")
         self._set_page(chosen)
@@ -449,7 +460,7 @@ class Scene:
 
     @staticmethod
     def _choose(present, given, what, **choices):
-        """What is present with what is given, of the types that are present; what is refused changes nothing"""
+        """The present settings updated by the given ones, which must have the same types; an error changes nothing"""
         chosen = dict(present)
         for name, value in given.items():
             whole = "%s(): %s" % (what, name)
@@ -485,7 +496,7 @@ class Scene:
 
     @one_thread
     def set_up(self) -> None:
-        """Checks and assembles the scene; the first run does it otherwise. Collective."""
+        """Checks and assembles the scene; without this call the first run does it. Collective."""
         self._core.set_up()
         self._fixed = True
 
@@ -496,21 +507,23 @@ class Scene:
         Parameters
         ----------
         tolerance : float, optional
-            Of the error of positions in every step, in their units and radians, times the largest of one and what the coordinates reach (PETSc's default: 1e-4).
-            Where everything moves by micrometres, in metres, or where a contact a hundred metres away gives way by millimetres, it has to be as much smaller, or
-            what is smaller than the tolerance is not there. Rotations are tested with the same number, in radians: where lengths are small in their unit give them
-            a tolerance of their own, ``scene.start(angle_tol=1e-6)``, or steps are a hundred times as many as they need be.
+            Tolerance of the error of positions in every step, in the unit of length and radians, multiplied by max(1, largest coordinate so far)
+            (PETSc's default: 1e-4). Motions smaller than the tolerance are not resolved: if all motions are of micrometres, in metres, or a
+            contact a hundred metres from the origin deforms by millimetres, a correspondingly smaller tolerance is required. Rotations are tested
+            with the same number, in radians: if lengths are small numbers in their unit, set a separate tolerance of angles,
+            ``scene.start(angle_tol=1e-6)``; otherwise the run may need a hundred times as many steps.
         sample : float or None
             Time between samples of the channels, at its multiples and the start; 0: the end of every step, which costs nothing; None: nothing is recorded. Accelerations and reactions
-            within steps are more accurate than those at their ends, as a rule, but not with fast modes that hardly anything damps, of flexible bodies
-            above all: see `Snapshot`. Those are better sampled at the ends of steps, or with a smaller tolerance.
+            within steps are usually more accurate than those at the ends, but not with fast, weakly damped modes, above all of flexible bodies,
+            see `Snapshot`. Sample these at the ends of steps, or use a smaller tolerance.
         after : Run, optional
-            The run goes on where that one is, with parameters as they are now.
+            The new run continues from the present state of that run, with the present values of parameters.
         options : dict, optional
-            PETSc's options without the dash, ``{"ts_adapt_type": "none", "ts_dt": 1e-3}``, for this run alone; those of the command line win.
+            PETSc's options without the dash, ``{"ts_adapt_type": "none", "ts_dt": 1e-3}``, for this run only; options of the command line have
+            precedence.
         page : bool or str
-            Records frames for `Run.page`; a string names the file that they are written to, else it is a temporary one. Title, and number of frames or
-            time between them, are those of `output`.
+            Whether frames for `Run.page` are recorded; a string is the name of the file, otherwise it is a temporary one. Title, and number of
+            frames or time between them, are those of `output`.
         """
         return Run(self, tolerance, sample, after, options, page)
 
@@ -520,7 +533,7 @@ class Scene:
         return self.run(tolerance, sample, None, options, page).solve(until)
 
     def view(self, file: str = "") -> None:
-        """Prints what the scene has, degrees of freedom and redundant constraints, or writes it into a file. Collective."""
+        """Prints the contents of the scene, its degrees of freedom and redundant constraints, or writes them to a file. Collective."""
         self._core.set_up()
         self._fixed = True
         self._core.view(self.comm, file)

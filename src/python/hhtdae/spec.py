@@ -1,4 +1,4 @@
-"""What joints, motions and forces share: fields for the C++ part, formulas of parameters in them, documentation."""
+"""Common part of joints, motions and forces: fields for the C++ part, formulas of parameters in them, documentation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _zero():
 
 
 def number(x, name):
-    """A number as a float"""
+    """Converts a number to float; an error names it"""
     if isinstance(x, np.ndarray) and x.ndim == 0:
         x = x[()]
     if not isinstance(x, numbers.Real):
@@ -34,14 +34,14 @@ def number(x, name):
 
 
 def text(x, who):
-    """A name"""
+    """Checks that a name is a string"""
     if not isinstance(x, str):
         raise TypeError("%s: the name is %r, must be a text" % (who, x))
     return x
 
 
 def formulas(x):
-    """A number, and those of an array, that are formulas"""
+    """The list of those numbers that are formulas; x: a number or an array"""
     if isinstance(x, Expression):
         return [x]
     if isinstance(x, (tuple, list)):
@@ -50,14 +50,14 @@ def formulas(x):
 
 
 def check_parameters(nodes, scene, who):
-    """Parameters are the scene's own: it would never hear of other values of another one's"""
+    """Checks that parameters belong to the scene, since it is not notified of changed parameters of another scene"""
     for p in nodes:
         if isinstance(p, Parameter) and p._scene is not scene:
             raise ValueError("%s: parameter %s is of another scene; use one that parameter() of this scene has made" % (who, p.name))
 
 
 def has_formula(x, scene, who):
-    """Whether a number of the description, or one of an array, is a formula: one of the scene's parameters"""
+    """Whether a number of the description, or one in an array, is a formula of the scene's parameters"""
     found = formulas(x)
     nodes = ordered(found)
     if any(n.op in ("measure", "argument", "function") for n in nodes):
@@ -68,7 +68,7 @@ def has_formula(x, scene, who):
 
 
 def plain(x):
-    """The same with the present values of formulas"""
+    """x with formulas replaced by their present values"""
     if isinstance(x, Expression):
         return float(x)
     if isinstance(x, (tuple, list)):
@@ -79,8 +79,8 @@ def plain(x):
 
 
 def copied(x, known=None):
-    """Lists, dictionaries, arrays and data classes are copied, with what is in them; all else, formulas and parameters above all, stays the object that it is.
-    For what is read again later, as it was when it was given"""
+    """A deep copy of lists, dictionaries, arrays and data classes; other objects, above all formulas and parameters, are not copied. Used for
+    descriptions that are read again later and must not change meanwhile"""
     known = {} if known is None else known
     if id(x) in known:
         return known[id(x)]
@@ -113,12 +113,12 @@ def _law(f, keep):
 
 
 class Spec:
-    """What elements share: their fields for the C++ part"""
+    """Base of elements: their fields for the C++ part"""
 
-    _functions = {}  # fields that are functions: how they are converted
+    _functions = {}  # for fields that are functions: how to convert them
 
     def _convert(self, keep, who):
-        """The functions, once"""
+        """The functions of the element, converted once"""
         converted = {}
         for name, how in self._functions.items():
             x = getattr(self, name)
@@ -133,13 +133,13 @@ class Spec:
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name not in self._functions}
 
     def _check(self, who):
-        """None is a value of fields alone that have it as a default, and of markers, about which the library complains"""
+        """An error if a field is None, unless that is its default, or it is a marker, which the library checks"""
         for f in fields(self):
             if getattr(self, f.name) is None and f.default is not None and f.type not in (Any, "Any"):
                 raise TypeError("%s: %s is None, must be a value%s" % (who, f.name, "" if f.default is MISSING and f.default_factory is MISSING else "; leave it out for its default"))
 
     def _described(self, scene, who):
-        """Whether it depends on parameters"""
+        """Whether the element depends on parameters"""
         self._check(who)
         return any([x._described(scene, "%s: %s" % (who, name)) if isinstance(x, Spec) else has_formula(x, scene, "%s: %s" % (who, name)) for name, x in self._numbers().items()])
 
@@ -165,7 +165,7 @@ else:
 
 @dataclass_transform(eq_default=False)
 def _spec(cls):
-    """A data class that is compared by identity, with what all elements share in its documentation"""
+    """Makes a data class that is compared by identity, and adds the fields that all elements have to its documentation"""
     cls = dataclass(eq=False)(cls)
     if cls.__doc__ and {"i", "j"} <= {f.name for f in fields(cls)}:
         cls.__doc__ += _MARKERS + (_STATE if "state" in {f.name for f in fields(cls)} else "")
@@ -175,10 +175,10 @@ def _spec(cls):
 _MARKERS = """
 
     i, j : Marker
-        On the body that is acted on, and on the one that takes the reaction.
+        Markers on the body on which the element acts, and on the body on which the reaction acts.
 """
 _STATE = """    state : bool
-        Its components are unknowns of the equations, force states.
+        Whether its components are unknowns of the equations, force states.
 """
 
 

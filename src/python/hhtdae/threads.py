@@ -1,4 +1,4 @@
-"""PETSc is for one thread at a time: a second one that asks it for something meanwhile is told so, where it would crash now and then."""
+"""PETSc is for one thread at a time: a call from a second thread meanwhile raises an error instead of crashing occasionally."""
 
 import functools
 import os
@@ -11,7 +11,7 @@ _busy = threading.RLock()
 
 
 def _anew():
-    """In a copy of the process only the thread that has made it goes on"""
+    """After a fork only the thread that called it exists, so that the lock is replaced by a free one"""
     global _busy
     _busy = threading.RLock()
 
@@ -21,7 +21,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def one_thread(function: F) -> F:
-    """The function is an error while another thread is in one of those; what a run calls back is in its thread."""
+    """A decorator: calling the function raises an error while another thread is in a decorated function. Callbacks of a run are in its thread."""
     @functools.wraps(function)
     def alone(*arguments, **named):
         mine = _busy

@@ -1,4 +1,4 @@
-"""What is done with formulas: tracing Python functions, tapes for the C++ part, derivatives."""
+"""Processing of formulas: tracing of Python functions, tapes for the C++ part, derivatives."""
 
 from . import _core
 from .expressions import CONDITIONS, Expression, TimeFunction, _constant, _expression, _node, _power, _unary, cos, cosh, sin, sinh, sqrt, where
@@ -14,7 +14,7 @@ def trace(function, count, what):
 
 
 def ordered(roots):
-    """All nodes below the roots, operands before those that use them"""
+    """All nodes of the formulas `roots`, operands before the nodes that use them"""
     done, order, stack = set(), [], [(r, False) for r in reversed(roots)]
     while stack:
         node, ready = stack.pop()
@@ -30,8 +30,8 @@ def ordered(roots):
 
 
 def compile_tape(roots, leaves, keep, arguments=None):
-    """The tape of formulas. `leaves`: number of the argument of each measure, by key(); nodes `argument` have theirs. `keep` gets what has to
-    outlive the tape."""
+    """The tape of the formulas `roots`. leaves: number of the argument for each measure, by key(); nodes of kind `argument` contain their number.
+    Objects that have to outlive the tape are appended to keep."""
     codes = _core.operations
     operations, constants, parameters, tables, functions = [], [], [], [], []
     register, known = {}, {}
@@ -100,7 +100,7 @@ def _chain(n, x):
     if op == "negate":
         return (_expression(-1.),)
     if op == "power":
-        nothing = _node("equal", a, 0.)  # as for square roots
+        nothing = _node("equal", a, 0.)  # the derivative at 0 is set to 0, as for square roots
         by_base = x[1] * _power(a, x[1] - 1.)
         by_base = where(nothing & (x[1] < 1.), 0., by_base) if not (_constant(x[1]) or 0.) >= 1. else by_base
         return by_base, (_expression(0.) if _constant(x[1]) is not None else where(nothing, 0., n * _unary("log", a)))
@@ -117,7 +117,7 @@ def _chain(n, x):
     rules = {"sin": lambda: cos(a), "cos": lambda: -sin(a), "tan": lambda: 1. + n * n, "asin": lambda: 1. / sqrt(1. - a * a),
              "acos": lambda: -1. / sqrt(1. - a * a), "atan": lambda: 1. / (1. + a * a), "sinh": lambda: cosh(a), "cosh": lambda: sinh(a),
              "tanh": lambda: 1. - n * n, "exp": lambda: n, "log": lambda: 1. / a, "log10": lambda: 0.43429448190325182765 / a,
-             "sqrt": lambda: where(n <= 0, 0., 0.5 / n),  # at 0 as the numbers of the kernels have it: of sqrt(v v) v the rest is 0 there
+             "sqrt": lambda: where(n <= 0, 0., 0.5 / n),  # 0 at 0 as in dual.h, so that derivatives of products such as sqrt(v v) v are finite
              "cbrt": lambda: 1. / (3. * n * n), "abs": lambda: where(a < 0, -1., where(a <= 0, 0., 1.))}
     if op in rules:
         return (rules[op](),)
@@ -125,7 +125,7 @@ def _chain(n, x):
 
 
 def differentiate(roots, arguments):
-    """The derivatives of formulas by arguments, by number: a dictionary {(root, argument): formula} of those that are not zero"""
+    """The nonzero derivatives of formulas by arguments, as a dictionary {(number of the root, number of the argument): formula}"""
     order = ordered(roots)
     depends = {}
     for n in order:
