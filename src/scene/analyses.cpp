@@ -4,7 +4,7 @@
 
     (F_u + r F_u' + s F_u'') d = (0, Phi),   s large: d is the smallest step in the metric of the mass matrix.
 
-  Steps are shortened to largest_turn (still.h). Velocities, accelerations and multipliers are then those of a consistent start from these positions.
+  Steps are limited to largest_turn (still.h). Velocities, accelerations and multipliers then follow from a consistent start at these positions.
 */
 #include "hhtdae/analyses.h"
 #include "guard.h"
@@ -19,15 +19,17 @@ namespace hhtdae
 namespace
 {
 
-/* s, 1/s^2: 2^40, so that stiffnesses are negligible beside the masses in the metric of a step; as a power of two it adds no rounding */
+/* s in 1/s^2: 2^40, so that stiffnesses are negligible compared with the masses in the metric of a step; as a power of two it adds no rounding */
 constexpr double mass_shift = 1099511627776.;
-/* r, 1/s: with r = 0 the row of a first-order state whose rate does not depend on itself would be zero and the matrix singular. Not a round number, which the rate constant of a
-   user's state might equal and cancel (Analyses.KinematicsBesideIntegrators). */
+/* r in 1/s: with r = 0 the row of a first-order state whose rate does not depend on the state would be zero and the
+   matrix singular. It is not a round number, since the rate constant of a user's state might be equal to a round number
+   and cancel it (Analyses.KinematicsBesideIntegrators). */
 constexpr double state_shift       = 0.7310585786300049;
-constexpr int    newton_iterations = 100, max_step_halvings = 6; /* per assembly; per iteration */
+constexpr int    newton_iterations = 100, max_step_halvings = 6; /* largest numbers: of iterations in an assembly, and of halvings of a step */
 /* Limit on iterations beyond newton_iterations, which are allowed in proportion to the length of the first step (Analyses.KinematicsOfWhatIsGearedUp) */
 constexpr double max_extra_iterations = 1e4;
-/* rad, of any motion between two assemblies: well below half a turn, beyond which full turns of angles would be lost (CountedAngles.KinematicsOverManyTurns) */
+/* Largest change of an angle that a motion prescribes between two assemblies, rad: well below half a turn, beyond which
+   full turns of angles would be lost (CountedAngles.KinematicsOverManyTurns) */
 constexpr double max_motion_angle = 1;
 /* Newton steps shorter than this, in radians or parts of the scene's size, are rounding and end the iteration */
 constexpr double negligible_step = 1e-13;
@@ -82,8 +84,9 @@ struct AssemblySystem : StillSystem {
 };
 
 /*
-  Takes the step d, of length `part` in units of largest_turn, halved until it reduces the violation. Rows have different units (lengths, sines, those of users), so a norm of the
-  violations is no measure of progress. The length of the next simplified Newton step, with the same matrix, is one: Deuflhard's natural monotonicity test
+  Adds the step d, whose length is `part` in units of largest_turn, halved until it reduces the violation. Rows have different
+  units (lengths, sines, those of users), so that a norm of the violations does not measure progress. The length of the next
+  simplified Newton step, with the same matrix, does: Deuflhard's natural monotonicity test
   (Analyses.KinematicsInAnyUnitsOfLength).
 */
 PetscErrorCode DampedStep(AssemblySystem &E, double part, bool *improved)
@@ -101,7 +104,7 @@ PetscErrorCode DampedStep(AssemblySystem &E, double part, bool *improved)
   PetscFunctionReturn(0);
 }
 
-/* Names the most violated constraint at U, for messages; no name if the violation is infinite or NaN */
+/* name: the most violated constraint at U, for messages; empty if the violation is infinite or NaN */
 PetscErrorCode WorstRow(AssemblySystem &E, std::string *name)
 {
   const double misfit = E.misfit;
@@ -143,8 +146,9 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
     PetscCall(Remember(E.R, E.U, E.zero));
     PetscCall(RenewAxes(E.R, E.U, E.V));
   }
-  /* Either the violations are within the tolerance, as lengths and as sines (Analyses.AssemblyThatFallsShort), or the last Newton step is, as in scenes so large that rounding of
-     lengths exceeds the tolerance (Analyses.KinematicsInAnyUnitsOfLength) */
+  /* Success if the violations are within the tolerance, both as lengths and as sines (Analyses.AssemblyThatFallsShort),
+     or if the last Newton step is, in scenes so large that rounding of lengths exceeds the tolerance
+     (Analyses.KinematicsInAnyUnitsOfLength) */
   const double tolerance = E.R.scene.start.tolerance;
   const bool   met       = E.misfit <= tolerance * std::min(1.0, E.size) || part * largest_turn <= tolerance;
   if (!met) {
@@ -169,7 +173,8 @@ double TurnOfMotions(const SceneData &s, double from, double to)
   return worst;
 }
 
-/* MeetConstraints() in intervals of time in which no motion turns by more than max_motion_angle: the nearest positions that satisfy a motion determine its angle only up to full turns */
+/* Calls MeetConstraints() at the ends of intervals of time in which no motion turns by more than max_motion_angle, since
+   the nearest positions that satisfy a motion determine its angle only up to full turns */
 PetscErrorCode FollowMotions(Runtime &R, double from, double t, Vec U, Vec V)
 {
   PetscFunctionBegin;
@@ -197,7 +202,7 @@ PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* Static equilibrium at t; positions follow the motions to t before */
+/* Moves the run to static equilibrium at t, after its positions have followed the motions to t */
 PetscErrorCode AtRest(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
 {
   PetscInt  iterations;
@@ -208,7 +213,7 @@ PetscErrorCode AtRest(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
   PetscCall(FollowMotions(R, from, t, U, V));
   PetscCall(RelaxAt(R, t, U, &iterations));
   PetscCall(TSSetTime(ts, t));
-  PetscCall(KeepStart(ts, V)); /* accelerations are zero as velocities are */
+  PetscCall(KeepStart(ts, V)); /* V is zero and also serves as the accelerations, which are zero */
   PetscCall(StartWithMotions(ts));
   PetscFunctionReturn(0);
 }

@@ -1,4 +1,4 @@
-/* The recorded calls that describe a scene, so that they can be repeated with other parameters, or for a set-up with another start. */
+/* The recorded calls that describe a scene. They are repeated with other parameters, or for a set-up with another StartPolicy. */
 #ifndef HHTDAE_SCENE_JOURNAL_H
 #define HHTDAE_SCENE_JOURNAL_H
 
@@ -11,10 +11,11 @@ namespace hhtdae
 
 struct Scene::Journal {
   std::vector<std::function<void(Scene &)>> calls;
-  std::vector<std::size_t>                  before; /* markers and bodies, attachments among them, at first before each call */
+  std::vector<std::size_t>                  before; /* number of markers and bodies, including attachments, before each call when it was recorded */
   std::map<std::string, Parameter>          parameters;
-  std::vector<std::string>                  errors; /* of parameters themselves */
-  bool                                      stale = false; /* a parameter, start() or an option of the set-up has changed since the present model was described */
+  std::vector<std::string>                  errors; /* errors in calls of parameter() */
+  /* whether a parameter, start() or an option of the set-up has changed since the present model was described */
+  bool                                      stale = false;
   std::string                               solvers;       /* options of the set-up's linear solvers, with which the present model was set up */
 };
 

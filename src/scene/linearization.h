@@ -29,17 +29,18 @@ struct RowRates : RowValues {
 };
 
 struct Linearization::Work {
-  TS                         start = nullptr; /* for a run that has not begun: a copy that has made its first step, from which accelerations and multipliers are taken */
+  TS                         start = nullptr; /* for a run that has not begun: a copy, BeginCopy(), that provides accelerations and multipliers */
   Runtime                   *R = nullptr;
-  double                     t = 0, size = 1;                                     /* t: time; size: of the scene */
-  Vector3                    spin = Vector3::Zero(), spin_rate = Vector3::Zero(); /* angular velocity and acceleration of the axes of displacements and rotations */
-  Matrix3                    axes = Matrix3::Identity(); /* these axes in space */
+  double                     t = 0, size = 1;                                     /* t: time of the state; size: size of the scene */
+  /* angular velocity and acceleration of the axes in which displacements and rotations are given */
+  Vector3                    spin = Vector3::Zero(), spin_rate = Vector3::Zero();
+  Matrix3                    axes = Matrix3::Identity(); /* orientation of these axes in space */
   Vec                        state[3] = {};   /* u, u', u'' */
-  mutable Origin             origin;          /* references and memories that belong to `state` */
+  mutable Origin             origin;          /* reference attitudes and memories that belong to `state` */
   Mat                        M = nullptr, C = nullptr, K = nullptr;
   Mat                        turn[3][3] = {}; /* T_kl of linearize.cpp, l <= k */
   std::vector<unsigned char> role;         /* of own unknowns */
-  std::vector<double>        unit;         /* of own unknowns: 1/sqrt(mass) for coordinates, in units of which masses are 1; else 1 */
+  std::vector<double>        unit;         /* units of own unknowns: 1/sqrt(mass) for coordinates, so that masses become 1; 1 for others */
   mutable Snapshot           perturbed;
 
   ~Work() { clear(); }
@@ -59,20 +60,21 @@ struct Linearization::Work {
   PetscErrorCode pointLoad(const Excitation &in, std::vector<double> *b) const;
   PetscErrorCode groundLoad(const Vector3 &ground, std::vector<double> *b) const;
   PetscErrorCode toState(const SmallMotion &x, Vec d[3]) const;
-  /* rates of these rows of constraints, with the variables that they read eliminated, and of M; global numbers. Zero where there is no constraint. */
+  /* Rates of the given rows of constraints, after elimination of the given variables, which these rows read, and of M; rows and variables are
+     global numbers. Zero if there are no constraints. */
   PetscErrorCode rates(const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const;
   PetscErrorCode ratesInTime(double e, bool at_rest, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const;
   PetscErrorCode ratesBy(double e, bool of_time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const;
   PetscErrorCode rowsAt(double later, double time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowValues *out) const;
   PetscErrorCode characteristicRate(double *rate) const;
-  PetscErrorCode setState(Vec at[3]) const; /* takes this state, near `state`, into `perturbed` */
+  PetscErrorCode setState(Vec at[3]) const; /* sets the snapshot `perturbed` to the state `at`, which is near `state` */
   PetscErrorCode linearizeAt(double later, double time, Work *w) const;
 };
 
-/* Eliminates the variables from these rows of C and K by the variables' own rows; NaN if those are singular */
+/* Eliminates variables from the given rows of C and K by means of the variables' own rows; NaN if the latter are singular */
 void EliminateVariables(const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, Eigen::MatrixXd &C, Eigen::MatrixXd &K);
 
-/* The whole distributed matrix as a dense one on every rank */
+/* Copies a distributed matrix to a dense one on every rank */
 PetscErrorCode GatherDense(Mat A, Eigen::MatrixXd &out);
 
 /* The amplitude of a measure in the motion Re(x exp(s t)) */

@@ -27,10 +27,11 @@ namespace hhtdae
 namespace
 {
 
-/* 2^40, as sv (1/s) or sa (1/s^2): F_u is negligible beside the shifted term, which is isolated to all digits; as a power of two it adds no rounding */
+/* 2^40, used for sv (1/s) or sa (1/s^2): F_u is negligible compared with the shifted term, which is then obtained to all
+   digits; as a power of two it adds no rounding */
 constexpr double derivative_shift = 1099511627776.;
 
-/* F_u, F_u' or F_u'': the matrix with the shifts minus F_u (`less`), divided by the shift */
+/* F_u, F_u' or F_u''. The latter two are the Jacobian with one shift minus F_u (`less`), divided by the shift */
 PetscErrorCode DerivativeMatrix(Runtime &R, double t, const Vec s[3], double sv, double sa, Mat less, Mat *out)
 {
   Mat J;
@@ -187,10 +188,13 @@ PetscErrorCode Linearization::Work::check(const char *call, const Mode &m) const
   PetscFunctionReturn(0);
 }
 
-/* Chooses the spin of the axes: that of the given body, else the mean of all flexible bodies if they spin alike, since modal coordinates are in the bodies' axes */
+/* Chooses the spin of the axes: that of the given body, else the mean of all flexible bodies if their spins agree,
+   because modal coordinates are in the bodies' axes */
 PetscErrorCode Linearization::Work::chooseAxes(Body of)
 {
-  constexpr double    same_spin_tolerance = 1e-2, slow_spin_ratio = 1e-4; /* differences of spins relative to the fastest; spins relative to the lowest eigenfrequency of a flexible body that do not affect modes (SmallBodies.AxesOfSeveralBodies) */
+  /* largest difference of the bodies' spins relative to the fastest one for a common spin; largest spin relative to the
+     lowest eigenfrequency of a flexible body that does not affect modes (SmallBodies.AxesOfSeveralBodies) */
+  constexpr double    same_spin_tolerance = 1e-2, slow_spin_ratio = 1e-4;
   const SceneData &s     = R->scene;
   Vec              at[3] = {state[0], state[1], state[2]};
   double              fastest = 0, angular_difference = 0, slowest = INFINITY;
@@ -256,7 +260,8 @@ PetscErrorCode Linearization::Work::differentiate()
   PetscFunctionReturn(0);
 }
 
-/* unit = 1/sqrt(mass) from the diagonal of M, with the substitutes of assembly for missing inertia. Coordinates of extensions may have no diagonal entry: they get the largest unit */
+/* Sets unit = 1/sqrt(mass) from the diagonal of M; missing inertia is replaced as in assembly. Coordinates of extensions
+   without a diagonal entry get the largest unit */
 PetscErrorCode Linearization::Work::chooseUnits()
 {
   Vec           diagonal;

@@ -1,5 +1,5 @@
 /*
-  Small motions in minimal coordinates, by dense linear algebra, replicated on every rank.
+  Small motions in minimal coordinates, by dense linear algebra; every rank makes the whole computation.
 
   Accelerations and algebraic unknowns follow from positions q, velocities v, first-order states s and inputs f by the differentiated
   constraints; a dot marks rates of their rows along the motion:
@@ -9,17 +9,21 @@
 
   Variables that rows at velocity level read are eliminated beforehand, row_rates.cpp.
 
-  Positions are q = N z, N an orthonormal basis of the null space of Phi_q; velocities v = L y + P q + S s, L an orthonormal basis of the null space of Phi_q and Psi_v, P and S the
-  minimum-norm solutions of Phi_q v = -Phi_q. q, Psi_v v = -Psi_q q - Psi_s s. If the rows change along the motion, N and L change by the smallest rates: their columns are transported in
-  parallel, so that the coordinate of a single degree of freedom is the arc length of its path, in the metric of the masses, at any speed. So
+  Positions are q = N z, N an orthonormal basis of the null space of Phi_q; velocities v = L y + P q + S s, L an orthonormal
+  basis of the null space of Phi_q and Psi_v, P and S the minimum-norm solutions of Phi_q v = -Phi_q. q, Psi_v v = -Psi_q q -
+  Psi_s s. If the rows change along the motion, N and L change with the smallest possible rates: their columns undergo
+  parallel transport, so that the coordinate of a single degree of freedom is the arc length of its path, in the metric of the
+  masses, at any speed. The equations are
 
-    z' = N^T v,    y' = L^T q'' + L.^T (P q + S s),    s' from above.
+    z' = N^T v,    y' = L^T q'' + L.^T (P q + S s),    s' as above.
 
-  That holds where masses stay 1, in axes in which inertia does not turn. The inertia of a body that turns in these axes changes, and with it the lengths of the columns
-  of N in the metric of the masses, m = N^T M N. So the coordinates that are handed out are R z, with R R = m, and their rates (Metric).
+  That is the arc length as long as masses stay 1 in the axes of the linearization. The inertia of a body that turns in these axes
+  changes, and with it m = N^T M N, the metric of the masses on the columns of N. The states that are handed out are therefore R z,
+  with R R = m, and their rates (InUnitsOfMass()).
 
-  All of this is in coordinates for which masses are 1 (Work::unit), with rows of constraints of norm 1: in metres, radians and modal coordinates, whose magnitudes differ the more
-  the smaller the bodies are, orthonormal bases would lose digits (SmallBodies.StateSpace).
+  The computation uses coordinates for which masses are 1 (Work::unit), and rows of constraints of norm 1. In metres, radians
+  and modal coordinates, whose magnitudes differ the more the smaller the bodies are, orthonormal bases would lose digits
+  (SmallBodies.StateSpace).
 */
 #include "complement.h"
 #include "linearization.h"
@@ -67,7 +71,7 @@ Dense MinimumNormSolution(Dense A, const Dense &b, PetscBLASInt *rank)
 {
   const PetscBLASInt  m = (PetscBLASInt)A.rows(), n = (PetscBLASInt)A.cols(), k = (PetscBLASInt)b.cols(), longer = PetscMax(m, n);
   const PetscBLASInt  size = 64 * (m + n) + k;
-  const double        least = PETSC_MACHINE_EPSILON * (double)PetscMin(m, n); /* singular values, in parts of the largest, that count as 0 */
+  const double        least = PETSC_MACHINE_EPSILON * (double)PetscMin(m, n); /* singular values below this part of the largest one count as 0 */
   std::vector<double> singular(PetscMin(m, n) + 1), work(size);
   PetscBLASInt        info = 0;
   Dense               x = Dense::Zero(longer, k);
@@ -92,7 +96,9 @@ struct ConstraintRows {
     }
     for (Eigen::Index i = 0; i < m; i++) {
       const double norm = A.row(i).norm();
-      scale(i)          = 1 / (norm + (double)(norm == 0)); /* not a conditional: vectorized code might divide by zero in the branch not taken and trap */
+      /* no conditional expression, since vectorized code might divide by zero in the branch that is not taken and cause a
+         floating-point trap */
+      scale(i)          = 1 / (norm + (double)(norm == 0));
       A.row(i) *= scale(i);
     }
     if (m <= n) free = OrthogonalComplement(A.transpose()); /* else the rows are dependent */
@@ -104,7 +110,7 @@ struct ConstraintRows {
 
 struct Minimal {
   std::vector<PetscInt> q, holonomic, velocity, s, algebraic; /* global numbers; algebraic: multipliers of constraints, then variables and force states */
-  Eigen::VectorXd       unit;                                 /* of all unknowns; the matrices below are in these units */
+  Eigen::VectorXd       unit;                                 /* units of all unknowns; the matrices below are in these units */
   Dense                N, L, P, S;
   Dense                y; /* (q'', s', rest) from (z, y, s, f) */
   Dense                A, B;
@@ -166,7 +172,8 @@ struct BasisMetric {
   }
 };
 
-/* Scales the matrices to units in which masses are 1 and rows of constraints have norm 1, with their multipliers; and the rates of these rows */
+/* Scales the matrices to units in which masses are 1 and rows of constraints have norm 1, with corresponding multipliers;
+   scales the rates of these rows, too */
 void ToUnits(Minimal &m, Dense &M, Dense &C, Dense &K, const std::vector<PetscInt> &constraints, RowRates &rates)
 {
   for (Dense *X : {&M, &C, &K}) *X = m.unit.asDiagonal() * *X * m.unit.asDiagonal();
@@ -325,8 +332,9 @@ template <class T> void Unknowns(const Linearization::Work &w, const Minimal &m,
   for (std::size_t k = 0; k < m.algebraic.size(); k++) put(0, m.algebraic[k], other((Eigen::Index)(m.q.size() + m.s.size() + k)));
 }
 
-/* Eigenvalues with non-negative imaginary parts, and their vectors. LAPACK balances A, without which slow modes would be lost: entries of order 1 for rates of positions stand beside
-   entries of the size of stiffness over mass for rates of velocities, up to 1e15 in a steel part of 1 mm (SmallBodies.Modes). */
+/* Eigenvalues with non-negative imaginary parts, and their vectors. LAPACK balances A; without balancing slow modes would
+   be lost, because A has entries of order 1 for rates of positions and entries of the order of stiffness over mass for
+   rates of velocities, up to 1e15 in a steel part of 1 mm (SmallBodies.Modes). */
 PetscErrorCode Eigenpairs(MPI_Comm comm, Dense A, std::vector<Complex> *value, Eigen::MatrixXcd *vector)
 {
   const PetscBLASInt n = (PetscBLASInt)A.rows(), one = 1, ask = -1;
@@ -343,7 +351,7 @@ PetscErrorCode Eigenpairs(MPI_Comm comm, Dense A, std::vector<Complex> *value, E
   value->clear();
   vector->resize(n, n);
   for (Eigen::Index k = 0; k < n; k++) {
-    if (im(k) < 0) continue; /* the other one of a complex pair */
+    if (im(k) < 0) continue; /* the conjugate of the eigenvalue before it */
     vector->col((Eigen::Index)value->size()) = V.col(k);
     if (im(k) > 0) vector->col((Eigen::Index)value->size()) += Complex(0, 1) * V.col(k + 1);
     value->push_back({re(k), im(k)});

@@ -1,4 +1,4 @@
-/* Parameters of a scene: after a change of them, or of how runs start, the calls that describe the scene are repeated. */
+/* Parameters of a scene. After a change of a parameter or of the StartPolicy, the calls that describe the scene are repeated. */
 #include "journal.h"
 #include <cmath>
 

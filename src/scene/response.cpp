@@ -10,13 +10,14 @@ namespace hhtdae
 namespace
 {
 
-constexpr int scalings = 3, refinements = 5; /* passes of equilibration; steps of iterative refinement at most */
-/* Residual, relative to the largest terms of the equations, at which refinement ends; 1e3 times as much is an error */
+constexpr int scalings = 3, refinements = 5; /* number of passes of equilibration; largest number of steps of iterative refinement */
+/* Refinement ends when the residual, relative to the largest terms of the equations, is below this; a final residual
+   above 1e3 times this is an error */
 constexpr double backward_error = 1e-13;
 
 /* The pattern is the same for all frequencies, so that the symbolic factorization is done once */
 struct Response {
-  Mat K = nullptr, A = nullptr; /* K, with the pattern of M added; the system, scaled by D on both sides */
+  Mat K = nullptr, A = nullptr; /* K: stiffness matrix, with the pattern of M added; A: matrix of the system, scaled by D on both sides */
   Vec b = nullptr, x = nullptr, D = nullptr, residual = nullptr, change = nullptr;
   KSP ksp = nullptr;
 };

@@ -3,9 +3,9 @@
 
     q + q' e + q'' e^2/2,    v + q'' e,
 
-  on which first rates of C and second rates of K depend. Factors of whole rows do not matter: they do not change the reduction. Rows of users may
-  depend on time explicitly; then time changes, too, and the step of the differences is searched for, since the time scale of such a row is not known
-  (Linearize.RowsThatTurnByThemselves).
+  on which first rates of C and second rates of K depend. Factors of whole rows do not change the reduction and are ignored.
+  Users' rows may depend on time explicitly; then time changes along the motion, too, and a suitable step of the differences
+  is searched for, since the time scale of such a row is not known (Linearize.RowsThatTurnByThemselves).
 
   Rows at velocity level may read variables, V = -K_VV^-1 (K_Vq q + C_Vq v + K_Vs s + ...) by the variables' own rows: these are eliminated, here and in
   minimal.cpp.
@@ -23,10 +23,12 @@ namespace hhtdae
 namespace
 {
 
-/* Step of the differences as a rotation, rad, or displacement, parts of the scene's size, of the fastest body; for rows that depend on time the first step, in s, is at least this */
+/* Step of the differences, expressed as the rotation, rad, or displacement, part of the scene's size, of the fastest
+   body; for rows that depend on time the first step is at least this many seconds */
 constexpr double difference_step = 1e-2;
-/* For rows that depend on time: ratio of successive steps, number of changes at most in either direction, and the relative difference of the rates from two successive steps that ends
-   the search. The ratio is irrational, so that not all steps are multiples of the period of a row, which would then count as constant */
+/* For rows that depend on time: ratio of successive steps, relative difference of the rates from two successive steps
+   that ends the search, and largest number of changes in either direction. The ratio is irrational, so that not all steps
+   are multiples of the period of a row, which would then seem constant */
 constexpr double golden     = 1.6180339887498949;
 constexpr double step_ratio = 5 * golden, agreement = 1e-6;
 constexpr int    max_step_changes = 16;
@@ -175,7 +177,7 @@ PetscErrorCode Linearization::Work::rowsAt(double later, double time, const std:
   PetscFunctionReturn(0);
 }
 
-/* Rates by differences with step e, s; of_time: t changes, too */
+/* Rates by differences with the step e, s; of_time: whether t changes, too */
 PetscErrorCode Linearization::Work::ratesBy(double e, bool of_time, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
 {
   constexpr double first[5] = {1. / 12, -8. / 12, 0, 8. / 12, -1. / 12}, second[5] = {-1. / 12, 16. / 12, -30. / 12, 16. / 12, -1. / 12};
@@ -207,8 +209,9 @@ static double RelativeDifference(const Eigen::MatrixXd &a, const Eigen::MatrixXd
   return size > 0 ? (a - b).cwiseAbs().maxCoeff() / size : 0;
 }
 
-/* Rates of rows that depend on time: with decreasing steps from e on until two results agree, else those that agree best. At rest e is first increased until the rows have
-   changed by difference_step relatively. */
+/* Rates of rows that depend on time. The step decreases from e on until two successive results agree; if none do, the
+   results that agree best are used. At rest e is first increased until the relative change of the rows is
+   difference_step. */
 PetscErrorCode Linearization::Work::ratesInTime(double e, bool at_rest, const std::vector<PetscInt> &rows, const std::vector<PetscInt> &variables, RowRates *out) const
 {
   RowValues start, other;
@@ -247,7 +250,7 @@ PetscErrorCode Linearization::Work::rates(const std::vector<PetscInt> &rows, con
   PetscFunctionBegin;
   PetscCall(MatGetSize(K, &n, nullptr));
   out->setZero((Eigen::Index)rows.size(), n);
-  if (rows.empty()) PetscFunctionReturn(0); /* of any rank */
+  if (rows.empty()) PetscFunctionReturn(0); /* `rows` is the same on all ranks */
   PetscCall(rowsAt(0, t, rows, variables, &start));
   for (double later : {difference_step, difference_step / golden}) {
     if (of_time) break;

@@ -34,9 +34,11 @@ PetscErrorCode Linearization::Work::toState(const SmallMotion &x, Vec d[3]) cons
   PetscFunctionReturn(0);
 }
 
-/* Differences of fourth order with decreasing steps until two agree; most measures are nearly polynomial along a small motion, and the first two agree. With a steep force, as in contacts, large
-   steps leave the linear range; with small ones the difference is rounding of the measure. If this rounding is large, as of a pressure or a reaction under preload, larger steps are
-   tried as well (Linearize.MeasuresFarFromZero). `largest`: largest displacement of the whole motion, of which `along` may be the real or imaginary part. */
+/* Differences of fourth order with decreasing steps until two agree. Most measures are nearly polynomial along a small
+   motion, so that the first two agree. With a steep force, as in contacts, large steps leave the linear range; with small
+   steps differences are rounding of the measure. If this rounding is large, for example of a pressure or of a reaction
+   under preload, larger steps are tried as well (Linearize.MeasuresFarFromZero). largest: largest displacement of the
+   whole motion, of which `along` is the real or imaginary part. */
 PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMotion &along, double largest, double *x) const
 {
   constexpr double weight[2] = {8. / 12, -1. / 12}, agreement = 1e-9;
@@ -65,7 +67,7 @@ PetscErrorCode Linearization::Work::derivative(const Measure &m, const SmallMoti
         PetscCall(setState(at));
         PetscCall(perturbed.value(m, &y));
         y -= reference;
-        if (m.kind == Measure::Angle) y = std::remainder(y, 2 * M_PI); /* an angle of half a turn may be pi or -pi */
+        if (m.kind == Measure::Angle) y = std::remainder(y, 2 * M_PI); /* near half a turn the angle may change from pi to -pi */
         estimate += side * weight[k - 1] * y / e;
       }
     const double uncertainty = std::abs(estimate - previous) + rounding; /* infinite for the first step */
@@ -208,7 +210,9 @@ PetscErrorCode AmplitudeOf(const Linearization::Work &w, const Measure &m, const
 {
   double part[2], largest;
   PetscFunctionBegin;
-  PetscCall(w.displacement(x, &largest)); /* of both parts: one of them may be next to nothing in coordinates, and not in states */
+  /* largest displacement of real and imaginary part together: one of them may be nearly zero in coordinates but not in
+     states */
+  PetscCall(w.displacement(x, &largest));
   for (int imaginary = 0; imaginary < 2; imaginary++) {
     SmallMotion          along;
     std::complex<double> power = 1;
@@ -254,7 +258,7 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
   const Work    &w = *work_;
   const Runtime &R = *w.R;
   Vec            x, y;
-  double         energy[2] = {0, 0}; /* of the body, and of all */
+  double         energy[2] = {0, 0}; /* kinetic energy of the body, and of all bodies */
   Vector3c       motion[2] = {Vector3c::Zero(), Vector3c::Zero()};
   PetscFunctionBegin;
   PetscCall(w.check("Linearization::part()", m));
@@ -290,7 +294,7 @@ PetscErrorCode Linearization::part(const Mode &m, Body b, BodyPart *part) const
     for (int c = 0; c < position; c++) motion[0](c) = m.shape[first + c];
     for (int c = 0; c < rotations; c++) motion[1](rotations == 1 ? 2 : c) = m.shape[first + position + c];
   }
-  if (mine && R.bodies.body[local].kind == BodyKind::Attached) { /* its motion follows from its body and the modes */
+  if (mine && R.bodies.body[local].kind == BodyKind::Attached) { /* the motion of a frame follows from its flexible body and the modes */
     const LocalBody       &k    = R.bodies.body[local];
     const Carrier         &c    = R.bodies.carriers[k.carrier];
     const Eigen::MatrixXd  J    = c.jacobian(R.bodies, (int)k.place);

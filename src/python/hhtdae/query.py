@@ -196,14 +196,17 @@ def _excitation(x):
 class Linearization:
     """Small motions about the state of a run at a time, made by `Run.linearize`: M x'' + C x' + K x = b f. All calls are collective.
 
-    x are displacements and small rotations of bodies, and all other unknowns. M, C and K are those of this moment: small motions go on with them where the state is in
-    equilibrium, or steady as seen from the axes that x is in. These are at this moment those of space and turn with the body `axes` (a driven hub for its blades); without one,
-    with the flexible bodies where all of them turn alike; else, or where `axes` is `scene.ground`, they stand still: an axisymmetric rotor of rigid discs at
-    speed is steady as seen from space. Modes in axes of a round rotor are those in space, faster or slower by its speed.
+    x are displacements and small rotations of bodies, and all other unknowns. M, C and K are those at the time of the state. They describe small
+    motions at later times only if the state is an equilibrium or a motion that is steady relative to the axes of x. These axes coincide with
+    those of space at the time of the state and rotate with the body `axes` (for example a driven hub for its blades); without `axes`, they rotate
+    with the flexible bodies if all of these have the same angular velocity; otherwise, or if `axes` is `scene.ground`, they do not rotate: a
+    rotating axisymmetric rotor of rigid discs is steady relative to space. Frequencies relative to the axes of an axisymmetric rotor differ from
+    those in space by its speed.
 
-    A swinging rod is steady from nowhere. There `modes()` without a count and `state_space()` are of the rates that small motions have at this moment, how
-    constraints change along the motion included; `response()` and `modes(count)`, which are sparse, are of equilibria and steady motions. They warn where accelerations
-    change the state within a period of the slowest motion that is asked for; a rotor that is not round has to be looked at from itself, which no warning tells.
+    The motion of a swinging rod is steady relative to no axes. In such a state `modes()` without a count and `state_space()` describe the rates
+    of small motions at this time, including the change of constraints along the motion; `response()` and `modes(count)`, which use sparse
+    matrices, are valid for equilibria and steady motions only. They warn if accelerations change the state within a period of the slowest
+    requested motion. A rotor that is not axisymmetric must be linearized relative to itself; no warning indicates this.
     """
 
     @one_thread
@@ -216,8 +219,9 @@ class Linearization:
         self._changes = None  # see _unsteadiness()
 
     def _unsteadiness(self):
-        """The body that changes its velocity or angular velocity most, as seen from the axes, relative to the distances of bodies; by how much (1/s^2), and the square of a rate at which
-        the scene moves by itself. In a steady motion velocities are constant vectors of the axes, a = W x v for axes that turn with W. Nothing if the run has gone on since then."""
+        """The name of the body whose velocity or angular velocity changes most relative to the axes, the rate of this change (1/s^2, lengths
+        relative to the distances of bodies), and the square of a rate at which the scene moves. In a steady motion velocities are constant in the
+        axes: a = W x v for axes with the angular velocity W. ("", 0, 0) if the run has made steps since then."""
         from .scene import Body
 
         ts = self._core.ts
@@ -238,7 +242,7 @@ class Linearization:
         return bodies[change.argmax()].name, change.max(), rate
 
     def _spin(self, now, w):
-        """Angular velocity of the axes, see linearize.h; w: of the bodies"""
+        """Angular velocity of the axes, see linearize.h; w: angular velocities of the bodies"""
         if self._axes is not None:
             return now.body(self._axes)["angular_velocity"] if self._axes._id >= 0 else np.zeros(3)
         w = w[[flexible for _, _, flexible in self._scene._moving]]
@@ -246,7 +250,8 @@ class Linearization:
         return w.mean(axis=0) if alike else np.zeros(3)
 
     def _warn_if_unsteady(self, call, rates):
-        """What is sparse has constraints as they are at this moment; rates: of the motions that are asked for, 1/s"""
+        """Warns if the state changes too fast for sparse methods, which do not include the change of constraints along the motion; rates: of the
+        requested motions, 1/s"""
         if self._changes is None:
             self._changes = self._unsteadiness()
         body, change, own = self._changes
@@ -258,8 +263,8 @@ class Linearization:
                           % (call, self._time, body, change / square, square**0.5), RuntimeWarning, 3)
 
     def modes(self, count=None, shift=1.):
-        """Natural modes, a list of `Mode` by increasing abs(value): all by dense algebra, for scenes of up to 1000 unknowns; or the `count` slowest by
-        SLEPc, looked for about the real number `shift` (1/s)."""
+        """Natural modes, a list of `Mode` by increasing abs(value): all modes by dense algebra, for scenes of up to 1000 unknowns; or the `count`
+        slowest ones by SLEPc with the real shift `shift` (1/s)."""
         if count is None:
             return self._core.modes()
         from . import flexible
@@ -278,7 +283,7 @@ class Linearization:
         return found
 
     def _freedoms(self):
-        """Coordinates less constraints"""
+        """Number of coordinates minus number of constraints"""
         size = {role: rows.getSize() if rows else 0 for role in ("coordinate", "holonomic", "nonholonomic") for rows in [_core.get_is(self._core.ts, role)]}
         return size["coordinate"] - size["holonomic"] - size["nonholonomic"]
 
@@ -291,7 +296,7 @@ class Linearization:
         return self._core.value(mode, _measure(measure))
 
     def response(self, excitation, measure, omega):
-        """Complex amplitudes of a measure where the input is cos(omega t), for each circular frequency of `omega` (rad per unit of time)."""
+        """Complex amplitudes of a measure for the input cos(omega t), for each circular frequency in `omega` (rad per unit of time)."""
         omega = np.atleast_1d(np.asarray(omega, dtype=float))
         found = self._core.response(_excitation(excitation), _measure(measure), omega)
         self._warn_if_unsteady("response()", omega)
@@ -309,7 +314,7 @@ class Linearization:
         return self._core.operators()
 
     def animate(self, mode, prefix, amplitude, frames=24):
-        """A period of a mode for ParaView: prefix.pvd and a file for each frame."""
+        """Writes an animation of one period of a mode for ParaView: prefix.pvd and a file for each frame."""
         self._core.animate(mode, prefix, amplitude, frames)
 
     def close(self):
