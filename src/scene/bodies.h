@@ -75,7 +75,7 @@ struct BodyMotion {
 
 struct LocalMarker {
   PetscInt body;
-  Vector3  s; /* from the centre of mass, body axes */
+  Vector3  s; /* position relative to the centre of mass, body axes */
   Matrix3  R; /* axes, in body axes */
 };
 
@@ -128,7 +128,8 @@ public:
     return f;
   }
   Vector3 angularAcceleration(PetscInt b, const double *v, const double *a) const; /* v, a: all local velocities and accelerations */
-  Vector3 acceleration(PetscInt b, const double *v, const double *a) const;        /* of the centre of mass or floating frame's origin */
+  /* acceleration of the centre of mass, or of the origin of the floating frame */
+  Vector3 acceleration(PetscInt b, const double *v, const double *a) const;
   Twist<double> twist(PetscInt m, const Frame<double> &f) const
   {
     const BodyMotion &b = now[marker[m].body];

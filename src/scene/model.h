@@ -10,7 +10,7 @@ namespace hhtdae
 /* Global numbers of all unknowns, the same on every rank. Their order within a rank is: coordinates of bodies, multipliers and force states kernel by
    kernel, variables, first-order states, unknowns of extensions. */
 struct Numbering {
-  std::vector<PetscMPIInt> owner;    /* of bodies; empty on one rank */
+  std::vector<PetscMPIInt> owner;    /* owner of each body; empty on one rank */
   std::vector<PetscInt>    first;    /* first unknown of each rank, and the total number */
   std::vector<PetscInt>    body;     /* first coordinate of each body */
   std::vector<PetscInt>    variable, state;

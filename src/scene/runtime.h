@@ -101,7 +101,7 @@ inline Runtime       *RunOf(TS ts)
 }
 /* layout.cpp: this rank's bodies, markers, batches, pattern, exchange */
 PetscErrorCode Layout(Runtime &R);
-Probe         &ReaderOf(Runtime &R, const Part &p);                         /* on the owner of the part */
+Probe         &ReaderOf(Runtime &R, const Part &p);                         /* the probe of a part of an element; called on the owner of the part */
 PetscErrorCode RolesOf(const Runtime &R, std::vector<unsigned char> &role); /* TSHHT3Role of own unknowns */
 /* initial.cpp: the described state as unknowns of the run */
 PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
@@ -109,7 +109,7 @@ PetscErrorCode InitialState(Runtime &R, Vec U, Vec V);
    their angular velocities in BodyMotion::w0 */
 PetscErrorCode NoteBeginning(Runtime &R, Vec V);
 PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const double *a, const double *local[3]);
-/* like LocalState(), but with other ranks' accelerations even if no element reads them; room: storage for these */
+/* The same as LocalState(), but with other ranks' accelerations even if no element reads them; room: storage for these accelerations */
 PetscErrorCode LocalMotion(Runtime &R, const double *u, const double *v, const double *a, std::vector<double> &room, const double *local[3]);
 PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F);
 PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, double sa, Mat J);

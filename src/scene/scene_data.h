@@ -40,7 +40,7 @@ struct BodyData {
   Vector3     center;   /* centre of mass relative to the body's origin, body axes */
   Vector3     r;        /* centre of mass at the start */
   Matrix3     A;        /* body axes at the start */
-  Vector3     v, w;     /* at the start, space axes */
+  Vector3     v, w;     /* velocity of the centre of mass and angular velocity at the start, space axes */
   /* null for rigid bodies; for a flexible body the other members describe the undeformed body and its floating frame */
   std::shared_ptr<const FlexibleData> flexible;
   /* if this body is the frame of an attachment or node: its flexible body, and its number in FlexibleData::place(); in a
@@ -54,7 +54,7 @@ struct BodyData {
 
 struct MarkerData {
   PetscInt body; /* -1: ground, -2: invalid */
-  Vector3  s;    /* from the centre of mass, body axes */
+  Vector3  s;    /* position relative to the centre of mass, body axes */
   Matrix3  R;    /* axes, in body axes */
 };
 
@@ -140,7 +140,7 @@ struct ParameterData {
 };
 
 struct SceneData {
-  PetscInt                                              number = 0; /* of the scene, stored in its handles */
+  PetscInt                                              number = 0; /* number of the scene, which its handles contain */
   MPI_Comm                    comm;
   bool                        planar = false;
   std::vector<BodyData>       bodies;
@@ -156,7 +156,7 @@ struct SceneData {
   std::vector<ChannelData>    channels;
   std::vector<ShapeData>      shapes;
   std::vector<SurfaceData>    surfaces;
-  std::vector<std::vector<PetscInt>> lines; /* of markers, in the animation */
+  std::vector<std::vector<PetscInt>> lines; /* polygons through markers, drawn in animations and pages */
   std::vector<ParameterData>  parameters;
   std::vector<std::string>    errors; /* found while the scene was described */
   std::set<std::string>       told;   /* notices that were printed, which runs with other parameters do not repeat */
@@ -223,9 +223,9 @@ public:
   /* adds `message`, such as "stiffness is -3, must not be negative", unless the condition holds */
   void require(bool condition, const std::string &message);
   void require(Marker m, const char *what);                 /* adds an error unless m is a marker of this scene */
-  Frame<double>    frame(Marker m) const { return data_.frame(m); } /* at the start; only if good() */
+  Frame<double>    frame(Marker m) const { return data_.frame(m); } /* the marker's frame at the start; only if good() */
   const SceneData &scene() const { return data_; }
-  bool             coincident(Marker i, Marker j) const; /* at the start, up to rounding of the positions */
+  bool             coincident(Marker i, Marker j) const; /* whether the markers coincide at the start, up to rounding of the positions */
 
   /* Adds an instance of a constraint kernel on these markers; returns the number of its first row among the element's rows */
   template <class K> PetscInt constrain(std::initializer_list<Marker> markers, const typename K::Data &data = {});

@@ -25,7 +25,7 @@ constexpr double largest_turn = 0.25; /* longest step of a body's coordinates: r
 
 struct StillSystem {
   Runtime &R;
-  double   t, size; /* of the scene */
+  double   t, size; /* time; size of the scene */
   Vec      U = nullptr, V = nullptr, A = nullptr, zero = nullptr, F = nullptr, d = nullptr, next = nullptr;
   Mat      J   = nullptr;
   KSP      ksp = nullptr;

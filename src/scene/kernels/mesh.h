@@ -23,7 +23,7 @@ namespace hhtdae
 /* The joint that holds a body, in the axes of the carrier's marker */
 struct MeshSide {
   Vec3<double> bearing = Vec3<double>::Zero();     /* origin of the joint's marker on the carrier */
-  Mat3<double> axes    = Mat3<double>::Identity(); /* its axes */
+  Mat3<double> axes    = Mat3<double>::Identity(); /* axes of that marker */
   Mat3<double> start   = Mat3<double>::Identity(); /* axes of the body's marker at the start */
 };
 
