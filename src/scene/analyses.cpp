@@ -155,7 +155,7 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
     std::string worst;
     PetscCall(WorstRow(E, &worst));
     SETERRQ(E.R.scene.comm, PETSC_ERR_CONV_FAILED,
-            "the scene cannot be assembled at t = %g: constraints or motions are violated by %g%s.\nTake smaller steps in time, or start nearer to where they are met", E.t,
+            "the scene cannot be assembled at t = %g: constraints or motions are violated by %g%s.\nTake smaller steps in time, or start nearer to positions that satisfy them", E.t,
             E.misfit, worst.c_str());
   }
   PetscCall(VecCopy(E.U, U));

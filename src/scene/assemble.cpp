@@ -388,12 +388,12 @@ PetscErrorCode AssemblePositions(Model &M, FixedBodies fixed_bodies, const Defor
     const std::string left = WorstPositions(s, OnRigidElements(m, d), s.start.tolerance);
     SetPoses(s, before);
     Perturb(s, BlocksOf(s, fixed_bodies, &d.rigid));
-    PetscCall(PetscInfo(nullptr, "scene: assembly once more, from positions that are %g away\n", perturbation));
+    PetscCall(PetscInfo(nullptr, "scene: assembly is repeated from positions perturbed by %g\n", perturbation));
     PetscCall(ProjectPositions(M, fixed_bodies, &ok, &d.rigid));
     if (!ok) SetPoses(s, before);
     PetscCheck(ok, s.comm, PETSC_ERR_CONV_FAILED,
                "the scene cannot be assembled; after %d iterations these constraints are not met:%s\n"
-               "Start nearer to where they are met, or free a body that is held by fixed_start",
+               "Start nearer to positions that satisfy them, or release a body that is held by fixed_start",
                (int)s.started.assembly_iterations, left.c_str());
   }
   PetscCall(ProjectPositions(M, fixed_bodies, &ok, &d.deforms)); /* remaining violations are removed by deformations at the start of the run */

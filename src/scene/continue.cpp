@@ -49,8 +49,8 @@ int Memory(const SceneData &s, std::size_t e)
 PetscErrorCode RefuseToContinue(const SceneData &s, const std::string &what)
 {
   SETERRQ(s.comm, PETSC_ERR_SUP,
-          "a run cannot go on when elements have come or gone that count angles over full turns or follow a curve, as %s: let joints, motions or forces come and go in their place (of "
-          "velocities, to lock a shaft), or change a parameter of an element that stays",
+          "a run cannot go on when elements have come or gone that count angles over full turns or follow a curve, as %s: add or remove other joints, motions or forces instead (for "
+          "example a motion of a velocity, to lock a shaft), or change a parameter of an element that exists in both runs",
           what.c_str());
 }
 
@@ -154,7 +154,7 @@ PetscErrorCode NotBegun(TS ts, const char *call, Runtime **R)
   PetscCall(ReadCheckpoint(ts)); /* a run continued from a checkpoint has begun */
   PetscCall(TSGetStepNumber(ts, &steps));
   PetscCheck(!steps, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
-             "%s: the run has begun and is not to be moved; make one that goes on from it, Scene::createTS(&next, ts)", call);
+             "%s: the run has begun and cannot be moved; make a run that continues it, Scene::createTS(&next, ts)", call);
   PetscFunctionReturn(0);
 }
 
@@ -407,7 +407,7 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     }));
     Model &M = *model_;
     PetscCheck(SameUnknowns(old->scene, M.scene), old->scene.comm, PETSC_ERR_ARG_WRONG,
-               "Scene::createTS(): the run cannot go on, since bodies, variables or states of the scene are not those that it was made with");
+               "Scene::createTS(): the run cannot go on, since bodies, variables or states of the scene differ from those of the run");
     M.continues    = true;
     M.begin        = t;
     M.first_begin         = old->model->continues ? old->model->first_begin : old->scene.start.time;

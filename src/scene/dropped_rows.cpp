@@ -142,8 +142,8 @@ PetscErrorCode CheckDropped(Runtime &R, PetscReal t, Vec U, Vec V)
   DescribedRows d;
   p->store->describe(R.scene, p->index, R.scene.start.time, d);
   SETERRQ(R.scene.comm, PETSC_ERR_ARG_WRONG,
-          "%s was dropped as redundant at the start, and is violated by %.3g at t = %g: where the mechanism is now, or with what motions want now, the other constraints do "
-          "not imply it.\nMend dimensions, positions or motions so that they agree, leave this constraint out, or start elsewhere",
+          "%s was dropped as redundant at the start, and is violated by %.3g at t = %g: in the present position, or with the present values of motions, the other constraints do "
+          "not imply it.\nChange dimensions, positions or motions so that they are consistent, remove this constraint, or start from another position",
           RowName(R.scene, row.element, row.row, d.name).c_str(), worst.violation, (double)t);
 }
 

@@ -184,7 +184,7 @@ PetscErrorCode Linearization::Work::check(const char *call, const Mode &m) const
   PetscCall(check(call));
   foreign = (PetscInt)m.shape.size() != R->n;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &foreign, 1, MPI_INT, MPI_MAX, comm()));
-  PetscCheck(!foreign, comm(), PETSC_ERR_ARG_WRONG, "%s: the mode's shape has not the unknowns of this linearization, but %d (of this rank, which has %d); take a mode of its own", call, (int)m.shape.size(), (int)R->n);
+  PetscCheck(!foreign, comm(), PETSC_ERR_ARG_WRONG, "%s: the mode's shape has %d entries on this rank, which has %d unknowns of this linearization; use a mode of this linearization", call, (int)m.shape.size(), (int)R->n);
   PetscFunctionReturn(0);
 }
 
@@ -222,7 +222,7 @@ PetscErrorCode Linearization::Work::chooseAxes(Body of)
     }
     if (fastest > 0) PetscCall(PetscInfo(nullptr, "scene: small motions in axes that turn with (%g, %g, %g) rad/s\n", spin(0), spin(1), spin(2)));
   } else if (fastest > slow_spin_ratio * slowest) {
-    PetscCall(PetscPrintf(comm(), "scene: flexible bodies do not turn alike, and modes at speed are wrong in space axes: Linearization::take() can be given the body from which the motion is steady\n"));
+    PetscCall(PetscPrintf(comm(), "scene: flexible bodies do not turn alike: if they rotate, modes relative to space axes are wrong. Give Linearization::take() the body relative to which the motion is steady\n"));
   }
   PetscFunctionReturn(0);
 }

@@ -17,7 +17,7 @@ PetscErrorCode ReadStartOptions(SceneData &s)
   PetscOptionsBegin(s.comm, nullptr, "Start of a multibody scene", "Scene");
   PetscCall(PetscOptionsEList("-scene_assemble", "Initial values that violate the constraints", "StartPolicy::assembly",
                               assemblies, 3, assemblies[assembly], &assembly, nullptr));
-  PetscCall(PetscOptionsReal("-scene_assemble_tol", "Misfit that is let pass, times the size of the scene",
+  PetscCall(PetscOptionsReal("-scene_assemble_tol", "Accepted violation of constraints, relative to the size of the largest mechanism",
                              "StartPolicy::tolerance", tolerance, &tolerance, nullptr));
   PetscCall(PetscOptionsEList("-scene_redundant", "Redundant constraints", "StartPolicy::redundant", redundants, 3,
                               redundants[redundant], &redundant, nullptr));
@@ -34,7 +34,7 @@ PetscErrorCode ReadStartOptions(SceneData &s)
   PetscOptionsEnd();
   PetscCheck(tolerance > 0, s.comm, PETSC_ERR_ARG_OUTOFRANGE, "-scene_assemble_tol is %g, must be positive",
              (double)tolerance);
-  PetscCheck(angle_tol >= 0, s.comm, PETSC_ERR_ARG_OUTOFRANGE, "-scene_angle_tol is %g, must be positive, or 0 for that of -ts_atol", (double)angle_tol);
+  PetscCheck(angle_tol >= 0, s.comm, PETSC_ERR_ARG_OUTOFRANGE, "-scene_angle_tol is %g, must be positive, or 0 for the tolerance -ts_atol", (double)angle_tol);
   p.assembly    = (Assembly)assembly;
   p.redundant   = (Redundant)redundant;
   p.tolerance   = tolerance;

@@ -385,11 +385,11 @@ PetscErrorCode KeepSingular(Model &M, const std::vector<RowBlock> &blocks, std::
     const RowBlock &b = blocks[found[0].block];
     PetscCheck(
         !moved || s.start.redundant != Redundant::Drop, s.comm, PETSC_ERR_ARG_WRONG,
-        "%zu of the constraints are redundant at the start, among them %s, but next to it no position meets them "
-        "all:\nwithout them the mechanism would move away from them, with them it is locked. Mend dimensions or "
-        "positions, leave out what locks it, or start elsewhere",
+        "%zu of the constraints are redundant at the start, among them %s, but no neighbouring position satisfies all constraints:\n"
+        "without the redundant ones the mechanism would move and violate them, with them it is locked. Change dimensions or "
+        "positions, remove the constraints that lock it, or start from another position",
         found.size(), RowName(s, b.element, b.first + found[0].row, b.name).c_str());
-    PetscCall(PetscInfo(nullptr, "scene: no neighbouring position to test redundant constraints at\n"));
+    PetscCall(PetscInfo(nullptr, "scene: found no neighbouring position at which to test redundant constraints\n"));
   }
   SetPoses(s, before);
   s.started = started;
@@ -434,7 +434,7 @@ PetscErrorCode WarnReaders(SceneData &s)
   PetscFunctionBegin;
   for (const ElementData &e : s.elements)
     if (ReadsDroppedRow(s, e))
-      PetscCall(TellOnce(s, "scene: " + std::string(e.type) + " " + e.name + " takes the forces of dropped rows for zero: put it on the joint that is left to carry the load, or use joints that leave more freedom\n"));
+      PetscCall(TellOnce(s, "scene: " + std::string(e.type) + " " + e.name + " takes the forces of dropped rows for zero. Attach it to the joint that carries the load, or use joints with more degrees of freedom\n"));
   PetscFunctionReturn(0);
 }
 

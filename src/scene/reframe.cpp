@@ -84,8 +84,8 @@ PetscErrorCode CheckTime(Runtime &R, PetscReal t)
 {
   PetscFunctionBegin;
   PetscCheck(t >= R.accepted, R.scene.comm, PETSC_ERR_ARG_WRONGSTATE,
-             "the TS starts again at t = %g, but what its rotations count from and its unwound angles are those of t = %g: take a new TS from "
-             "Scene::createTS() for another run, or TSHHT3CheckpointLoad() to go back",
+             "the TS starts again at t = %g, but its reference attitudes and counted angles are those of t = %g: take a new TS from "
+             "Scene::createTS() for another run, or use TSHHT3CheckpointLoad() to return to an earlier state",
              (double)t, (double)R.accepted);
   R.accepted = t;
   PetscFunctionReturn(0);

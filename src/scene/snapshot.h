@@ -100,7 +100,7 @@ template <class F> PetscErrorCode FromOwner(const Runtime &R, PetscMPIInt owner,
     });
   }
   if (R.size > 1) PetscCallMPI(MPI_Bcast(all.data(), n + 1, MPI_DOUBLE, owner, R.scene.comm));
-  PetscCheck(all[n] == 0, R.scene.comm, (PetscErrorCode)all[n], "rank %d could not answer a question to the run, see there", owner);
+  PetscCheck(all[n] == 0, R.scene.comm, (PetscErrorCode)all[n], "rank %d could not evaluate a query; its error message has the reason", owner);
   std::copy(all.begin(), all.end() - 1, x);
   PetscFunctionReturn(0);
 }

@@ -14,7 +14,7 @@ PetscErrorCode Linearization::animate(const Mode &m, const std::string &prefix, 
   Vec                   d[3], at[3];
   PetscFunctionBegin;
   PetscCall(w.check("Linearization::animate()", m));
-  PetscCheck(frames > 0 && std::isfinite(amplitude), w.comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization::animate(): %d frames of an amplitude of %g are none; the amplitude is in metres and radians", frames, amplitude);
+  PetscCheck(frames > 0 && std::isfinite(amplitude), w.comm(), PETSC_ERR_ARG_OUTOFRANGE, "Linearization::animate(): %d frames with the amplitude %g; the number must be positive and the amplitude, in metres and radians, finite", frames, amplitude);
   Runtime &R         = *w.R;
   settings.animation = prefix;
   PetscCall(MakeAnimation(R, settings, task));

@@ -270,7 +270,7 @@ PetscErrorCode TellOfNoOutput(const Runtime &R, TS ts)
   if (steps) PetscFunctionReturn(0);
   PetscCall(PetscObjectQuery((PetscObject)ts, expected_output, &mark));
   if (!mark) PetscFunctionReturn(0);
-  PetscCall(PetscPrintf(R.scene.comm, "scene: Scene::output() asks for results, which Scene::solve() writes; TSSolve() and TSStep() in its place write none\n"));
+  PetscCall(PetscPrintf(R.scene.comm, "scene: Scene::output() requests results, which Scene::solve() writes; TSSolve() and TSStep() write none\n"));
   PetscCall(OutputIsAttached(ts));
   PetscFunctionReturn(0);
 }
