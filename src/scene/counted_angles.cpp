@@ -1,5 +1,5 @@
 /*
-  Angles between markers that queries have asked for, counted over full turns: Remember() updates them at every accepted state of the
+  Angles between markers that have been queried, with full turns counted: Remember() updates them at every accepted state of the
   integrator or of an analysis.
 */
 #include "kernels/angle.h"

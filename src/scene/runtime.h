@@ -15,7 +15,7 @@ struct DroppedRows; /* dropped_rows.cpp */
 struct Recorder;    /* output/recorder.h */
 struct ChannelWork; /* output/channels.h */
 
-/* An angle between two markers that a query has asked for, rad, with full turns counted; its value at the last accepted
+/* An angle between two markers that has been queried, rad, with full turns counted; its value at the last accepted
    step, or at the first query if that was later */
 struct CountedAngle {
   PetscInt i, j; /* markers, in the scene */

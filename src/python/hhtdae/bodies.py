@@ -180,13 +180,13 @@ def axes_along(z, x=None):
 
 
 def _numbers(x):
-    """An array of floats, or of the formulas of parameters that x holds."""
+    """x as an array of floats, or, if it contains formulas of parameters, as an array of objects."""
     a = np.asarray(x)
     return a if a.dtype == object else np.asarray(x, dtype=float)
 
 
 def _matrix(J):
-    """Moments of inertia, of which the diagonal may have been given alone."""
+    """Moments of inertia as a 3 x 3 matrix; J: the matrix or its diagonal."""
     J = _numbers(J)
     return np.diag(J) if J.ndim == 1 else J
 

@@ -230,7 +230,7 @@ class ReducedBody:
     shape : (own nodes, 3, modes)
         The modes at the nodes, if they were kept.
     stress : (nodes with stress, 6, modes), and stress_nodes
-        Stress modes, components xx, yy, zz, xy, yz, zx, if they were asked for.
+        Stress modes, components xx, yy, zz, xy, yz, zx, if they were computed.
     """
 
     def __init__(self, core=None, comm=None):

@@ -64,8 +64,8 @@ def set_radius(ts, radius):
 
 
 def set_order(ts, order):
-    """Order 2, HHT (the default); 3, 4 or 5, backward differentiation, for smooth or well damped motion alone; or "auto", from step to step the order
-    with which the next one may be longest, where the motion is smooth. Orders above 2 need the form "second_order"."""
+    """Order 2, HHT (the default); 3, 4 or 5, backward differentiation, only for smooth or well damped motion; or "auto": while the motion is smooth,
+    the order that allows the longest next step. Orders above 2 need the form "second_order"."""
     if order != "auto" and order not in (2, 3, 4, 5):
         raise ValueError("order is %r, must be 2, 3, 4, 5 or 'auto'" % (order,))
     _core.set_order(ts, 0 if order == "auto" else order)

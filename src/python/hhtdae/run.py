@@ -341,7 +341,7 @@ class Run(Channels):
 
     @one_thread
     def kinematics(self, time: Any = None) -> "Run":
-        """As `assemble`, for scenes without degrees of freedom beside joints and motions: loads of a snapshot are those of inverse dynamics.
+        """As `assemble`, for scenes whose joints and motions leave no degree of freedom: loads of a snapshot are those of inverse dynamics.
         Returns the run.
 
         >>> scene.start(assembly="project")  # velocities that follow from motions need not be given

@@ -1,4 +1,4 @@
-/* Constraints that a user gives as expressions. */
+/* Users' constraints, given as expressions. */
 #include "scene/kernels/user_constraint.h"
 #include "scene/measures.h"
 #include "scene/motions/moving_pair.h"
