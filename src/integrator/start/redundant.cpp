@@ -15,7 +15,8 @@ PetscErrorCode NameRedundant(TS ts)
   PetscInt              start, n = 0, rows[20];
   Mat                   P;
   RowLabel              label;
-  std::string           text;
+  constexpr PetscInt max_named_rows = 4;
+  std::string           text, names;
   PetscBool             is_singular;
   MatSolverType         package;
 
@@ -35,13 +36,17 @@ PetscErrorCode NameRedundant(TS ts)
     PetscCall(ISDestroy(&multipliers));
   }
   for (PetscInt i = 0; i < n; i++) {
+    text += (i ? ", " : "") + std::to_string(rows[i]);
+    if (!I.names.name || i >= max_named_rows) continue;
     PetscCall(LabelRow(ts, rows[i], &label));
-    text += std::string(i ? ", " : "") + label.text;
+    names += std::string(i ? ", " : " Rows ") + label.text;
   }
+  if (n == 1) PetscCall(LabelRow(ts, rows[0], &label));
   PetscCheck(n != 1, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
-             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: no coordinate that can move changes the constraint in row %s. It depends on time alone, or has no derivatives here", (double)ts->ptime, text.c_str());
+             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: no coordinate that can move changes the constraint in row %s. It depends on time alone, or has no derivatives here", (double)ts->ptime, label.text);
   PetscCheck(!n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
-             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.", (double)ts->ptime, text.c_str());
+             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.%s%s", (double)ts->ptime, text.c_str(),
+             names.c_str(), I.names.name && n > max_named_rows ? ", ..." : "");
   PetscCall(PackageInDoubt(ts, &package));
   PetscCheck(!package, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "%s has met a zero pivot in the matrix [M Phi_q^T; Phi_q 0] at t = %g, whose constraints do not depend on one another. The cause may be this package, as multipliers have zeros on the diagonal: "
