@@ -337,10 +337,8 @@ TEST(EvaluateAt, PreconditionersWithParts)
       must(PCFieldSplitSetIS(pc, "all", all));
       must(ISDestroy(&all));
     }
-    {
-      Options in(options);
-      must(TSSetFromOptions(run.ts));
-    }
+    Options in(options);
+    must(TSSetFromOptions(run.ts));
     for (int k = 0; k < 5; k++) must(run.step());
     ErrorTrap trap;
     const double t = run.t() - 1e-4;

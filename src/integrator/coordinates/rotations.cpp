@@ -88,8 +88,6 @@ PetscErrorCode StageOfRotations(const Integrator &I)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Corrects a rotation vector u that was interpolated at the fraction x of the step, where the angular velocity is v: the polynomial
-   has the slopes w at both ends, and contains `part` of the commutator in U1 */
 void InterpolateCommutator(const Integrator &I, PetscReal x, PetscReal part, const PetscScalar *v0, const PetscScalar *v1, const PetscScalar *v, PetscScalar *u)
 {
   PetscScalar whole[3], now[3];
@@ -172,8 +170,6 @@ PetscErrorCode ReferToState(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the attitudes of U the reference until ReferBack(), which restores the entries of U from `before`. Used where constraints are
-   differentiated at U. */
 PetscErrorCode ReferTo(TS ts, Vec U, WorkVec &before)
 {
   Integrator &I = Get(ts);

@@ -123,8 +123,6 @@ PetscErrorCode NoteForces(TS ts, Vec F, PetscBool evaluated)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Called after a correction that would be the last one: whether forces of driven coordinates are as accurate as accelerations of free
-   ones, by `tolerance`. F: the residual at X if `evaluated`; it is evaluated here if needed. */
 PetscErrorCode ForcesOfDriven(TS ts, PetscReal tolerance, Vec X, Vec F, PetscBool *evaluated, PetscBool *good)
 {
   Integrator     &I      = Get(ts);

@@ -14,7 +14,7 @@ PetscErrorCode NoteInertia(TS ts, Mat P);
 PetscErrorCode NoteDriven(TS ts);
 PetscErrorCode NoteStiffness(TS ts, Vec X, Mat P);
 
-/* Rounding of each entry of the residual F at X */
+/* Rounding of each entry of the residual F at X, by two samples */
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise);
 
 /* Called before a correction is judged. F: the residual before the correction, or after it if `evaluated` */

@@ -136,7 +136,6 @@ PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rounding of each entry of the residual F at X, by two samples */
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
 {
   PetscFunctionBegin;

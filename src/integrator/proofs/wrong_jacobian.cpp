@@ -12,7 +12,6 @@ namespace
 {
 
 constexpr PetscReal probe_fraction = 0.25; /* part of the correction by which probes go to either side: near, to avoid corners of the model, but well above rounding */
-constexpr PetscReal above_rounding = 10;   /* a row is used if its expected change exceeds this times its rounding */
 constexpr PetscReal least_answer   = 0.1;  /* ratio of actual to expected change below which the Jacobian is wrong: ten corrections would not suffice */
 
 bool HasFollowed(const RowScale &s, PetscReal now, PetscReal was) { return PetscAbsReal(now) * s.answer <= unanswered_fraction * PetscAbsReal(was) * s.answer + s.rounding; }
@@ -38,7 +37,7 @@ PetscErrorCode MeasureAnswer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, V
     ts, sum,
     [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal m, PetscReal d) {
       const PetscReal model = m * s.answer;
-      if (PetscAbsReal(way * model) < above_rounding * s.rounding || HasFollowed(s, f, m)) return;
+      if (PetscAbsReal(way * model) < s.rounding || HasFollowed(s, f, m)) return;
       local[1] += d * s.answer * model;
       local[2] += way * model * model;
     },

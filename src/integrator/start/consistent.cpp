@@ -153,16 +153,14 @@ PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char 
   Integrator      &I = Get(ts);
   const PetscReal  h = c.h > 0 ? c.h : c.tiny;
   PetscObjectState state;
-  PetscBool        numbers = PETSC_FALSE;
+  PetscBool        numbers;
 
   PetscFunctionBegin;
-  for (int attempt = 0; attempt < 2 && !numbers; attempt++) { /* there is no h to cut: an application whose Jacobian is not a number is asked once more */
-    PetscCall(EvaluateJacobian(ts, c.t, c.U, c.V, c.A, 1 / h, 1 / (h * h), c.J ? c.J : c.P, c.P));
-    PetscCall(PetscObjectStateGet((PetscObject)c.P, &state));
-    if (state != c.linear->scaled) PetscCall(ScaleMatrix(I, {1 / h, 1 / (h * h), h * h, h, 1 / (h * h), 1 / h}, c.P));
-    PetscCall(PetscObjectStateGet((PetscObject)c.P, &c.linear->scaled));
-    PetscCall(MatrixHasNumbers(c.P, &numbers));
-  }
+  PetscCall(EvaluateJacobian(ts, c.t, c.U, c.V, c.A, 1 / h, 1 / (h * h), c.J ? c.J : c.P, c.P));
+  PetscCall(PetscObjectStateGet((PetscObject)c.P, &state));
+  if (state != c.linear->scaled) PetscCall(ScaleMatrix(I, {1 / h, 1 / (h * h), h * h, h, 1 / (h * h), 1 / h}, c.P));
+  PetscCall(PetscObjectStateGet((PetscObject)c.P, &c.linear->scaled));
+  PetscCall(MatrixHasNumbers(c.P, &numbers));
   if (c.near && numbers) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ChooseSolver(c.ksp, c.P, c.linear));
   PetscCall(Factor(ts, c.ksp, c.P, c.P, c.linear));
@@ -216,7 +214,7 @@ PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool
     else if (*ok && e <= c.enough * first) PetscFunctionReturn(PETSC_SUCCESS);
     const bool known = c.its > 1 && !fresh, falls = e <= slow_rate * last;
     if (!*ok || e <= converged_correction || (known && (falls ? CorrectorError(e / last, e) <= converged_correction : e <= rounding_correction))) PetscFunctionReturn(PETSC_SUCCESS);
-    if (known && !falls && c.h == 0) {
+    if (known && !falls) {
       PetscCall(IsBalanced(ts, c, &balanced));
       if (balanced) PetscFunctionReturn(PETSC_SUCCESS);
     }

@@ -57,13 +57,14 @@ PetscErrorCode TakeUnknowns(const Integrator &I, Consistent &c);
 PetscErrorCode ConsistentMatrix(TS ts, Consistent &c, PetscBool *ok, const char **why);
 PetscErrorCode SolveConsistent(TS ts, Consistent &c, bool have_matrix, PetscBool *ok, const char **why);
 
-/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0. Either output may be NULL. T: TimeScaleOfConstraints() */
+/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0: Phi' and Phi'' of holonomic rows, Psi and Psi' of velocity-level ones.
+   Other rows are zero. Either output may be NULL. T: TimeScaleOfConstraints() */
 PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, Levels *levels, Vec first, Vec second);
 
 /* Whether neither velocities nor time move what stands still */
 PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes);
 
-/* A time over which the motion changes q by as much as its tolerance refers to; another one over which constraints are differentiated along it: project.cpp */
+/* A time over which the motion changes q by as much as its tolerance refers to, min Y_i/|q'_i|; another one over which constraints are differentiated along it: project.cpp */
 PetscErrorCode TimeScale(TS ts, PetscReal *T);
 PetscErrorCode TimeScaleOfAccelerations(TS ts, Vec A, PetscReal *T);
 PetscErrorCode TimeScaleOfConstraints(TS ts, Vec V, PetscReal *T);

@@ -186,8 +186,8 @@ struct Path {
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* What rounding makes of each row: of the coordinates, the larger one of two samples, since in one of them it may cancel; at least that of the largest
-     coordinate: what is 0, as a rotation within the step, turns lengths that are rounded */
+  /* What rounding of the coordinates makes of each row, by a sample; at least that of the largest coordinate: what is 0, as a rotation within the step, turns lengths
+     that are rounded */
   PetscErrorCode roundingOfRows(std::vector<PetscReal> &rounding)
   {
     constexpr int times_rounding = 8; /* times rounding */
@@ -196,11 +196,9 @@ struct Path {
     PetscFunctionBegin;
     PetscCall(VecGetOwnershipRange(U, &start, NULL));
     rounding.assign(now.size(), PETSC_MACHINE_EPSILON * largest);
-    for (unsigned salt = 0; salt < 2; salt++) {
-      PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + times_rounding * PETSC_MACHINE_EPSILON * RandomRounding(start + i, salt)); }, Read(U), Write(at)));
-      PetscCall(rows(t, f));
-      for (size_t i = 0; i < f.size(); i++) rounding[i] = PetscMax(rounding[i], PetscAbsReal(f[i] - now[i]) / times_rounding);
-    }
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + times_rounding * PETSC_MACHINE_EPSILON * RandomRounding(start + i, 0)); }, Read(U), Write(at)));
+    PetscCall(rows(t, f));
+    for (size_t i = 0; i < f.size(); i++) rounding[i] = PetscMax(rounding[i], PetscAbsReal(f[i] - now[i]) / times_rounding);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 };
@@ -266,8 +264,6 @@ PetscErrorCode IsAtRest(const Integrator &I, Vec V, PetscBool *yes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* First and second time derivatives of the constraint rows along U + tau V, t + tau, at tau = 0: Phi' and Phi'' of
-   holonomic rows, Psi and Psi' of velocity-level ones. Other rows are zero. Either output may be NULL. T: the time scale of the motion */
 PetscErrorCode ConstraintDerivatives(TS ts, PetscReal t, Vec U, Vec V, PetscReal T, Levels *levels, Vec first, Vec second)
 {
   Integrator              &I = Get(ts);

@@ -119,9 +119,8 @@ PetscErrorCode ConstraintTerms(TS ts, Consistent &c)
 
   PetscFunctionBegin;
   PetscCall(TimeScale(ts, &T));
-  const bool      wide   = I.h < shortest_span * T;
-  const PetscReal length = wide ? shortest_span * T : I.h, begin = wide ? c.t - length / 2 : I.t0, apart = SpanFrom(begin, length / (time_points - 1));
-  for (int k = 0; k < time_points; k++) z[k] = begin - c.t + k * apart;
+  const PetscReal apart = SpanFrom(I.t0, PetscMax(I.h, shortest_span * T) / (time_points - 1));
+  for (int k = 0; k < time_points; k++) z[k] = I.t0 - c.t + k * apart;
   DerivativeWeights(z, weight);
   PetscCall(VecZeroEntries(c.gamma));
   for (int k = 0; k < time_points; k++) {
@@ -154,7 +153,6 @@ PetscErrorCode SolveSample(TS ts, Sampler &S, Derivatives derivatives, PetscBool
   PetscCall(ReferBack(ts, S.at.U, before));
   I.stat = saved;
   PetscCall(failed);
-  if (!*ok) PetscCall(KSPReset(S.at.ksp)); /* a factor that failed may keep its error */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -173,7 +173,6 @@ PetscReal TimeOf(TS ts, PetscReal rate, PetscReal within)
 
 } // namespace
 
-/* The largest of coordinates' rates or accelerations, each by the coordinate's size */
 PetscErrorCode RelativeRate(TS ts, Vec x, PetscReal *most)
 {
   Integrator     &I     = Get(ts);
@@ -184,7 +183,6 @@ PetscErrorCode RelativeRate(TS ts, Vec x, PetscReal *most)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A time over which the motion changes q by as much as its tolerance refers to: min Y_i/|q'_i| */
 PetscErrorCode TimeScale(TS ts, PetscReal *T)
 {
   PetscReal rate;

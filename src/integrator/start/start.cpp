@@ -211,8 +211,7 @@ PetscErrorCode SolveAt(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared &
 
 } // namespace
 
-/* X from U, V at t; X enters as the guess. h > 0: with the velocities and positions that the implicit Euler method reaches from U, V. Reference and factors are
-   left as they were after an error of the application too, which may go on. */
+/* Reference and factors are left as they were after an error of the application too, which may go on */
 PetscErrorCode ConsistentAccelerations(TS ts, PetscReal t, PetscReal h, Vec U, Vec V, Prepared &have, PetscBool *ok)
 {
   Integrator &I = Get(ts);

@@ -51,22 +51,8 @@ PetscErrorCode TimeConstant(TS ts, PetscReal h, Vec rate, PetscReal *tau)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A1: accelerations of the implicit step of length h from the start */
-PetscErrorCode ImplicitAccelerations(TS ts, PetscReal h, Prepared &have, PetscBool *ok)
-{
-  Integrator &I = Get(ts);
-
-  PetscFunctionBegin;
-  /* a guess that knows of the transient, whose forces would make a matrix far from that of its end, would be a bad one */
-  PetscCall(TakeRoles(I, I.X, {TSHHT3_STATE, TSHHT3_VARIABLE}, I.X));
-  PetscCall(ConsistentAccelerations(ts, ts->ptime, h, I.U0, I.V0, have, ok));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 } // namespace
 
-/* U0, V0, A0 hold a consistent start and `rate` what follows from it, for a step of length h. Where that has the time constant tau > 0 and an implicit
-   step of that kind damps its accelerations, V0 is what the transient `leaves`, and the rest is to be made anew. Else all is as it was. */
 PetscErrorCode RemoveTransient(TS ts, PetscReal h, Vec rate, Prepared &have, PetscReal *tau, PetscBool *leaves)
 {
   Integrator &I = Get(ts);
@@ -79,13 +65,13 @@ PetscErrorCode RemoveTransient(TS ts, PetscReal h, Vec rate, Prepared &have, Pet
   if (*tau <= 0) PetscFunctionReturn(PETSC_SUCCESS);
   const PetscReal euler = step_in_time_constants * *tau;
   PetscCall(gone.like(I.V0));
-  PetscCall(ImplicitAccelerations(ts, euler, have, leaves));
+  PetscCall(ConsistentAccelerations(ts, ts->ptime, euler, I.U0, I.V0, have, leaves));
   PetscCall(VecNorm(I.A0, NORM_2, &before));
   PetscCall(VecNorm(I.A1, NORM_2, &after));
   if (after >= damped_accelerations * before) *leaves = PETSC_FALSE;
   if (*leaves) {
     PetscCall(VecCopy(I.A1, gone));
-    PetscCall(ImplicitAccelerations(ts, second_step_ratio * euler, have, leaves));
+    PetscCall(ConsistentAccelerations(ts, ts->ptime, second_step_ratio * euler, I.U0, I.V0, have, leaves));
     PetscCall(VecAXPY(gone, -1, I.A1));
     PetscCall(VecScale(gone, euler / (1 - 1 / second_step_ratio)));
     PetscCall(CorrectionNorm(ts, gone, 1, &way));

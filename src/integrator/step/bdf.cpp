@@ -145,7 +145,6 @@ void ResetOrder(TS ts)
   I.p                          = I.hht;
 }
 
-/* Called before the end of the accepted step becomes t_n: puts its beginning into the past and makes o.next the order */
 void CommitOrder(Integrator &I)
 {
   Order &o = I.order;
@@ -185,7 +184,6 @@ PetscErrorCode CutPast(TS ts, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before an attempt of length I.h: sets the parameters of its order, and prepares a change from or to order two */
 PetscErrorCode UseOrder(TS ts)
 {
   Integrator &I = Get(ts);

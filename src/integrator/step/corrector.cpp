@@ -26,7 +26,6 @@ namespace hht3
 namespace
 {
 
-constexpr PetscReal proven_fraction        = 0.9; /* if the last step was at least this part of h, the linear solver works at about this length */
 constexpr PetscReal fraction_after_failure = 0.7; /* h_limit as a part of the h at which the corrector has failed */
 
 /* Repeats the iteration with a new Newton matrix, from the prediction or, if from_rest, from the positions at t_n (PredictRest()) */
@@ -93,9 +92,9 @@ PetscErrorCode RunCorrector(TS ts, PetscBool *converged)
   }
   c.matrix.learn(*converged, retry, c.xi_max, c.of(I.linear.constraint));
   if (!*converged) {
-    /* A matrix that is singular now and then at any h would lower h_limit with each failure, without end. So the limit stays if the
-       last step, of about this length, has succeeded (Failures.SingularMatrixNowAndThen). */
-    if (!c.no_solve || I.h_limit <= 0 || I.h_last < proven_fraction * I.h) I.h_limit = fraction_after_failure * I.h;
+    /* A matrix that is singular now and then at any h would lower h_limit with each failure, without end
+       (Failures.SingularMatrixNowAndThen) */
+    if (!c.no_solve || I.h_limit <= 0) I.h_limit = fraction_after_failure * I.h;
     I.stat.corrector_fails++;
     PetscCall(PetscInfo(ts, "corrector: %s\n", I.failure));
   }

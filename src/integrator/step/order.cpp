@@ -153,9 +153,6 @@ PetscErrorCode ErrorOfOrder(TS ts, NormType type, PetscReal *wlte)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Chooses the order of the step after the accepted one, whose error estimate is known. *next: on entry the step size that the
-   controller has chosen for the present order, on return the one for the chosen order; NULL if a TSAdapt other than "hhtdae" chooses
-   it. */
 PetscErrorCode ChooseOrder(TS ts, PetscReal *next)
 {
   Integrator &I = Get(ts);

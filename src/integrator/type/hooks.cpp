@@ -185,8 +185,6 @@ PetscErrorCode TakeSNESFunctions(TS ts, SNES snes)
 
 } // namespace
 
-/* The line search with which a correction costs no residual after the last one; where the user chose none, nor a type of SNES
-   that has its own */
 PetscErrorCode HooksLineSearch(TS ts)
 {
   SNES           snes;

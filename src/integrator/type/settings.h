@@ -21,7 +21,7 @@ PetscErrorCode ComposeSetters(TS ts, bool attach);
 /* An error in a setter that comes too late */
 PetscErrorCode NotAfterSetUp(TS ts, const char *what);
 
-/* Our line search, where the user chose none: a correction then costs no residual after the last one */
+/* Our line search, where the user chose none, nor a type of SNES that has its own: a correction then costs no residual after the last one */
 PetscErrorCode HooksLineSearch(TS ts);
 
 /* Our differences fill the matrix */
