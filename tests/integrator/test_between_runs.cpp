@@ -1,4 +1,4 @@
-/* What the user changes between steps and between runs of one TS: tolerances, values, time; and what an event leaves */
+/* What the user changes between steps and between runs of one TS: tolerances, values, time, parts of a run; and events */
 #include "integrator/start/start.h"
 #include "integrator/state.h"
 #include "support.h"
@@ -33,7 +33,7 @@ const Oscillators &oscillator()
   return p;
 }
 
-/* q'' + k q = 0 where k becomes another one at t = 1, or nothing but a load sin(2 pi t) */
+/* q'' + k q = load sin(2 pi t); an event handler changes k at t = 1 */
 struct Switched : Problem {
   mutable double k = 4.;
   double         load;
@@ -101,7 +101,7 @@ TEST(BetweenRuns, ANewRunForgetsHowLargeTheOldOneWas)
   EXPECT_NEAR(run.u()[0], std::cos(4.), 1e-3);
 }
 
-/* The time set back to where it began says so, too: PETSc goes on counting steps */
+/* Setting the time back to its initial value starts a new run, although PETSc's step number continues */
 TEST(BetweenRuns, ANewRunAtTheSameTime)
 {
   Simulation run(oscillator(), tolerance(1e-6)), fresh(oscillator(), tolerance(1e-6));
@@ -112,10 +112,11 @@ TEST(BetweenRuns, ANewRunAtTheSameTime)
   EXPECT_NEAR((double)(run.statistics().steps - before), (double)fresh.statistics().steps, 2.);
 }
 
-/* What the last step of a part made up for is not taken over into the next part, where it would be made up for a hundred times */
+/* When fixed steps are adjusted so that a part ends exactly at its final time, this adjustment must not be carried
+   over into the next part, where it would accumulate */
 TEST(BetweenRuns, FixedStepsInParts)
 {
-  for (double part : {.1, .01, .0005}) { /* also of less than a step */
+  for (double part : {.1, .01, .0005}) { /* the last one is shorter than a step */
     Simulation run(oscillator(), fixedSteps(1e-3));
     for (int k = 1; k <= 16; k++) {
       must(TSSetMaxTime(run.ts, k * part));
@@ -125,7 +126,7 @@ TEST(BetweenRuns, FixedStepsInParts)
     if (part > 1e-3) {
       EXPECT_NEAR(run.statistics().h_min, 1e-3, 1e-12) << part;
     }
-    must(TSSetTimeStep(run.ts, 5e-4)); /* another one, by the user */
+    must(TSSetTimeStep(run.ts, 5e-4)); /* the user sets another step size */
     must(TSSetMaxTime(run.ts, 16 * part + 0.1));
     const PetscInt before = run.statistics().steps;
     must(run.solve());
@@ -133,7 +134,8 @@ TEST(BetweenRuns, FixedStepsInParts)
   }
 }
 
-/* A part goes on as the run would have: without another start, a step of what rounding has left until the end of the last one, or looking ahead as far as in the whole run again */
+/* A run that is solved in parts continues as it would have without them: no new start, no step size equal to the
+   rounding error of the last part's end, and no new search for loads over the whole remaining run */
 TEST(BetweenRuns, SolvedInParts)
 {
   for (int parts : {7, 50, 300}) {
@@ -154,7 +156,7 @@ TEST(BetweenRuns, SolvedInParts)
   }
 }
 
-/* The first part is shorter than a step, which counts for those that follow */
+/* The first part is shorter than one step; the following steps have the fixed length again */
 TEST(BetweenRuns, FixedStepsAfterAShortPart)
 {
   Simulation run(oscillator(), fixedSteps(1e-2));
@@ -165,7 +167,7 @@ TEST(BetweenRuns, FixedStepsAfterAShortPart)
   EXPECT_EQ(run.statistics().steps, 101);
 }
 
-/* Points nearer to each other than a step, and steps that do not fit between them */
+/* Times of the span are closer together than a step, or their distance is not a multiple of the step */
 TEST(BetweenRuns, FixedStepsInATimeSpan)
 {
   const Oscillators p({1.}, {0.}, false, 1.);
@@ -190,7 +192,8 @@ TEST(BetweenRuns, FixedStepsInATimeSpan)
   }
 }
 
-/* TSSolve() where nothing is left of a run leaves no step size; what follows goes on as if it had not been called */
+/* A TSSolve() at the final time does nothing and must not change the step size: the next part gives the same digits as
+   without it */
 TEST(BetweenRuns, SolvedAgainAtTheEnd)
 {
   for (const std::string &steps : {tolerance(1e-6), tolerance(1e-6) + "-ts_dt 1e-3 ", fixedSteps(1e-2)}) {
@@ -214,7 +217,8 @@ TEST(BetweenRuns, SolvedAgainAtTheEnd)
   }
 }
 
-/* Points of a time span that are behind the beginning of a run have no solutions, and TSSolve() cuts the step to where they are */
+/* Times of the span before the beginning of the run have no solutions; TSSolve() of PETSc shortens the first step
+   according to such a time, which must have no effect */
 TEST(BetweenRuns, BeginInATimeSpan)
 {
   for (const std::string &steps : {tolerance(1e-6), tolerance(1e-6) + "-ts_dt 1e-3", fixedSteps(1e-2)})
@@ -234,7 +238,7 @@ TEST(BetweenRuns, BeginInATimeSpan)
       if (steps == fixedSteps(1e-2)) {
         EXPECT_EQ(run.statistics().steps, std::lround(100 * (1. - begin))) << begin;
       }
-      if (PETSC_VERSION_GE(3, 23, 0)) continue; /* which keeps no solutions for points behind */
+      if (PETSC_VERSION_GE(3, 23, 0)) continue; /* from 3.23 on PETSc keeps no solutions for these times */
       PetscInt n;
       Vec     *x;
       must(TSGetTimeSpanSolutions(run.ts, &n, &x));
@@ -247,7 +251,7 @@ TEST(BetweenRuns, BeginInATimeSpan)
     }
 }
 
-/* A load of period 1 does not see the time set back by 1 */
+/* With a load of period 1, setting the time back by 1 in the middle of a run does not change the solution */
 TEST(BetweenRuns, TimeSetBack)
 {
   const Switched p(1.);
@@ -266,7 +270,8 @@ TEST(BetweenRuns, TimeSetBack)
   }
 }
 
-/* PETSc accepts every step from an event to the end of the step in which it was; what the event has switched on is not to be missed */
+/* PETSc accepts the step from an event to the end of the interrupted step without an error test. The integrator tests
+   its error, so that the stiffness that the event's handler has switched on is noticed */
 TEST(Events, WhatTheyLeaveIsUnderTheErrorTest)
 {
   for (const char *order : {"2", "5"}) {
@@ -283,7 +288,8 @@ TEST(Events, WhatTheyLeaveIsUnderTheErrorTest)
   }
 }
 
-/* PETSc 3.18 goes astray where a function crosses zero against its direction, and asks for steps back: an error, not a run without end */
+/* If an event function crosses zero against the requested direction, TSEvent of PETSc 3.18 requests steps backwards in
+   time. This must be an error, not an endless run */
 TEST(Events, ThatGoBackAreRefused)
 {
   struct Fall : Problem {
@@ -311,7 +317,7 @@ TEST(Events, ThatGoBackAreRefused)
   }
 }
 
-/* Monitors are called where an event has taken a step back, too */
+/* Monitors can sample and interpolate the solution also after an event has shortened a step */
 TEST(Events, SamplesInMonitors)
 {
   const Switched p(0.);
@@ -336,7 +342,8 @@ TEST(Events, SamplesInMonitors)
 namespace
 {
 
-/* The largest error of the multiplier of a pendulum that falls from 90 degrees, of g/L times 3 cos(theta) at most: y alone tells it */
+/* Largest error of the multiplier of a pendulum released at 90 degrees, relative to its largest value 3 m g/L; the
+   exact multiplier is a function of y alone. `every`: TSRestartStep() after so many steps; `stops`: a time span */
 double errorOfTension(const std::string &options, int every = 0, const Array &stops = {})
 {
   const Pendulum p(-90., 0., 2.);
@@ -359,7 +366,8 @@ double errorOfTension(const std::string &options, int every = 0, const Array &st
 
 } // namespace
 
-/* Velocities of a step meet the constraints to second order. A restart from them as they are leaves oscillations of first order in the multipliers. */
+/* The velocities at the end of a step satisfy the constraints only to second order. If a restart used them without
+   projection, the multipliers would oscillate with an amplitude of first order */
 TEST(BetweenRuns, RestartsKeepTheMultipliers)
 {
   for (const char *alpha : {"-0.3", "-0.05"})
@@ -371,7 +379,8 @@ TEST(BetweenRuns, RestartsKeepTheMultipliers)
     }
 }
 
-/* x = sin 3 t is prescribed to a mass: without acceleration at first, which makes no ordinary step a tiny one */
+/* A mass follows x = sin 3 t, whose acceleration is zero at the start. Steps of ordinary length must not be treated as
+   steps too short for the corrector */
 TEST(FirstStep, DrivenFromNoAcceleration)
 {
   struct Driven : Problem {
@@ -406,7 +415,8 @@ TEST(FirstStep, DrivenFromNoAcceleration)
   }
 }
 
-/* Where something else than the error test keeps steps short the corrector's part of the tolerance, divided by h^2, is not left in the multipliers */
+/* When -ts_adapt_dt_max keeps steps short, the iteration error that the corrector may leave in q must not appear,
+   divided by h^2, in the multipliers */
 TEST(BetweenRuns, ShortStepsKeepTheMultipliers)
 {
   for (const char *alpha : {"-0.3", "-0.05"}) {
@@ -416,7 +426,9 @@ TEST(BetweenRuns, ShortStepsKeepTheMultipliers)
   }
 }
 
-/* A step far shorter than the others, the first one, one that an output time cuts off, or one to an event, leaves rounding in what the next ones stretch with h and h^2 */
+/* A step far shorter than its neighbours (the first step, a step to an output time or to an event) has rounding errors
+   in its accelerations and rates. The growing steps that follow must not magnify them, by factors of h and h^2, into
+   errors of the multipliers */
 TEST(BetweenRuns, GrowthFromAShortStepKeepsTheMultipliers)
 {
   for (const char *order : {"2", "auto"})
@@ -438,7 +450,7 @@ TEST(BetweenRuns, GrowthFromAShortStepKeepsTheMultipliers)
 namespace
 {
 
-/* On a pivot at 0.5 sin(t) */
+/* A pendulum of length 1 on a pivot that moves by 0.5 sin(t) */
 struct MovedPendulum : Problem {
   const double g = 9.81;
   explicit MovedPendulum(double end)
@@ -479,7 +491,8 @@ struct MovedPendulum : Problem {
 
 } // namespace
 
-/* The rest of a run tells nothing of how fast its motions are, neither does what is left of one at a restart */
+/* Constraints are differentiated in time over the time scale of the motion, not over the length of the run or the time
+   that remains at a restart, either of which may be far too short */
 TEST(BetweenRuns, ShortRunsHaveTheirMultipliers)
 {
   const auto largest = [](double end, int every) {
@@ -496,10 +509,10 @@ TEST(BetweenRuns, ShortRunsHaveTheirMultipliers)
   for (double end : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7}) {
     const double error = largest(end, 0);
     MEASURED("run of %g: tension off by %.1e of 9", end, error);
-    EXPECT_LT(error, end < 1e-4 ? 0.5 : 0.01) << end; /* rounding of positions over h^2 */
+    EXPECT_LT(error, end < 1e-4 ? 0.5 : 0.01) << end; /* rounding of positions, divided by h^2 */
   }
-  EXPECT_LT(largest(0.5, 3), 0.3); /* of 38 */
-  for (double end : {1e-4, 1e-5}) { /* from rest: what has hardly begun to move */
+  EXPECT_LT(largest(0.5, 3), 0.3); /* the tension is 38 at most */
+  for (double end : {1e-4, 1e-5}) { /* from rest, where nothing has moved noticeably by the end of the run */
     const Pendulum p(60., 0., end);
     Simulation     run(p, tolerance(1e-7));
     Array          tension;
@@ -509,8 +522,8 @@ TEST(BetweenRuns, ShortRunsHaveTheirMultipliers)
   }
 }
 
-/* The first step behind an event is as short as what is left of the run: what the last one has left of the constraints is not made good within that time, nor are motions
-   differentiated over it */
+/* The first step after an event is as short as the rest of the run. The drift of the constraints that the last step
+   has left must be projected away, and the constraints must not be differentiated over such a short time */
 TEST(Events, ShortlyBeforeTheEnd)
 {
   for (const char *start : {"report", "off", "project"})
@@ -528,7 +541,8 @@ TEST(Events, ShortlyBeforeTheEnd)
     }
 }
 
-/* What a run ends with, and what it has at given times between: a step cut short there would leave the multipliers far off, more so the higher the order */
+/* The last steps before the end of a run have about the same length. If the last step were simply cut to end in time,
+   the multipliers at the end would be inaccurate, the more so the higher the order */
 TEST(LastSteps, AreOfOneLength)
 {
   for (const char *order : {"2", "auto"})
@@ -550,13 +564,14 @@ TEST(LastSteps, AreOfOneLength)
     }
 }
 
-/* Parts that end between steps go on from the end of the last step: the same digits as in one run, also from a checkpoint */
+/* With -ts_exact_final_time interpolate a part ends between steps, and the next part continues from the end of the
+   last step. The digits are those of one run, also after a checkpoint */
 TEST(BetweenRuns, GoOnFromInterpolatedEnds)
 {
   const MovedPendulum p(2.);
   const std::string   file = "interpolated_" + std::to_string(getpid()) + ".cp", options = tolerance(1e-6) + "-ts_exact_final_time ";
   Simulation          one(p, options + "stepover"), parts(p, options + "interpolate"), resumed(p, options + "stepover -ts_hhtdae_resume " + file);
-  for (double t : {0.1, 2.}) { /* the first step knows of the first part alone */
+  for (double t : {0.1, 2.}) { /* the first step depends on the end of the first part */
     must(TSSetMaxTime(one.ts, t));
     must(one.solve());
   }
@@ -581,7 +596,8 @@ TEST(BetweenRuns, GoOnFromInterpolatedEnds)
   EXPECT_EQ(resumed.u(), one.u());
 }
 
-/* A kick of a mass in oil: it goes m v/c in a thousandth of the step at hand, and an oscillator that has nothing to do with it goes on */
+/* The velocity of a mass with a damper is changed between two runs: it then moves by m v/c within a thousandth of the
+   present step size. An uncoupled oscillator is not disturbed */
 TEST(BetweenRuns, AKickOfADampedMass)
 {
   struct Damped : Problem {
@@ -612,7 +628,8 @@ namespace
 
 enum class After { Restart, RollBack, Normalize, Forget } after;
 
-/* In every fifth step of a pendulum x, y, lambda, but not twice in one */
+/* Post-step function: changes the state of a pendulum (x, y, lambda) in every fifth step, as `after` says, but only
+   once if that step is repeated */
 PetscErrorCode changeWhatIsLeft(TS ts)
 {
   static PetscInt last = -1;
@@ -647,7 +664,8 @@ PetscErrorCode changeWhatIsLeft(TS ts)
 
 } // namespace
 
-/* What the integrator itself has left is no fault of the user's, who goes back, brings lengths into order or sets multipliers to zero */
+/* The constraint violation left by the integrator itself must not be reported as an inconsistent start when the user
+   restarts, rolls back, normalizes the length or sets multipliers to zero */
 TEST(BetweenRuns, WhatAStepHasLeft)
 {
   const Pendulum p(-30., 0., 2.);
@@ -663,7 +681,7 @@ TEST(BetweenRuns, WhatAStepHasLeft)
     angle[(int)x] = std::atan2(run.u()[1], run.u()[0]);
     EXPECT_NEAR(angle[(int)x], angle[0], 2e-3) << (int)x;
   }
-  Simulation run(p, tolerance(1e-7)); /* and who begins to count anew */
+  Simulation run(p, tolerance(1e-7)); /* and when the user sets the step number to 0 */
   Printed    out;
   for (double end : {1., 2.}) {
     must(TSSetMaxTime(run.ts, end));
@@ -673,7 +691,8 @@ TEST(BetweenRuns, WhatAStepHasLeft)
   EXPECT_EQ(out.text().find("violate"), std::string::npos) << out.text();
 }
 
-/* Steps by which TSEvent brackets a zero, in the last step of a part, are none that the user has given for the next part */
+/* The short steps with which TSEvent locates a zero in the last step of a part must not be taken for a step size that
+   the user has set for the next part */
 TEST(Events, InTheLastStepOfAPart)
 {
   Simulation run(oscillator(), fixedSteps(1e-2));
@@ -692,7 +711,8 @@ TEST(Events, InTheLastStepOfAPart)
   EXPECT_EQ(run.statistics().steps - before, 100);
 }
 
-/* A mechanism of a microsecond whose first step is chosen: the step behind an event's own ones is that before it, not PETSc's 0.1 */
+/* A mechanism with time scales of a microsecond whose first step is chosen automatically. After the steps that locate
+   an event, the step size is that before the event, not PETSc's default of 0.1 */
 TEST(Events, StepsBehindThemAreThoseBefore)
 {
   const Oscillators p({2e6}, {0.}, false, 4e-6);
@@ -722,7 +742,7 @@ TEST(Events, StepsBehindThemAreThoseBefore)
 namespace
 {
 
-/* Balls in free flight, thrown back where their height is zero */
+/* Balls in free flight that rebound at height zero */
 struct Balls : Problem {
   std::vector<double> height, restitution;
   Balls(std::vector<double> heights, std::vector<double> e, double end) : height(std::move(heights)), restitution(std::move(e))
@@ -796,7 +816,8 @@ void throwBalls(Simulation &run, Thrown &thrown)
 
 } // namespace
 
-/* In free flight nothing but the event ends a step: its function returns to zero within what is left of the step that had the last one */
+/* In free flight the error test does not limit the step. The first step after a bounce must end before the ball comes
+   down again, or the next bounce would be missed */
 TEST(Events, ABallIsNotLost)
 {
   for (double end : {.8, 1.1, 1.3, 1.5, 1.8, 2., 2.5, 3., 3.5, 4., 5., 7.}) {
@@ -812,7 +833,8 @@ TEST(Events, ABallIsNotLost)
   }
 }
 
-/* A function of an event that asks for the state at its time is answered in every step, also where it is asked before the first step behind an event */
+/* An event function may call TSHHT3EvaluateAt() at the time it is asked for, also when PETSc calls it before the first
+   step after an event */
 TEST(Events, FunctionsThatAskForTheState)
 {
   const Balls     p({1.}, {.9}, 3.);
@@ -849,7 +871,7 @@ TEST(Events, FunctionsThatAskForTheState)
   EXPECT_NEAR(run.u()[0], exact, 1e-6);
 }
 
-/* The rest of the step that had one event, up to the end of the run, has another one */
+/* The step that remains after one event, up to the end of the run, contains a second event */
 TEST(Events, TwoInOneStep)
 {
   const Balls         p({1.}, {1.}, 1.);
@@ -867,7 +889,7 @@ TEST(Events, TwoInOneStep)
   EXPECT_NEAR(times[1], .8, 1e-5);
 }
 
-/* Bounces that accumulate end where they are smaller than the tolerance of the event */
+/* Bounces that accumulate in time end where they are smaller than the tolerance of the event */
 TEST(Events, BouncesThatAccumulate)
 {
   const Balls p({1.}, {.5}, 3.);
@@ -882,7 +904,8 @@ TEST(Events, BouncesThatAccumulate)
 namespace
 {
 
-/* A point that falls with 10 m/s^2 to either side, towards x = 0: each passage turns the force, which nobody sees in the solution */
+/* A point that is accelerated by 10 m/s^2 towards x = 0; the event handler reverses the force at each passage and
+   leaves the solution vector unchanged */
 struct Turning : Problem {
   double         height;
   mutable double a = -10.;
@@ -900,7 +923,7 @@ struct Turning : Problem {
   int    passages() const { return (int)((t1 + period() / 4.) / (period() / 2.)); }
   double exact(double t) const
   {
-    const double quarter = period() / 4., rest = std::fmod(t + quarter, 2. * quarter) - quarter; /* from the last turning point of the same sign */
+    const double quarter = period() / 4., rest = std::fmod(t + quarter, 2. * quarter) - quarter; /* since the last turning point on this side */
     const int    half = (int)((t + quarter) / (2. * quarter));
     return (half % 2 ? -1. : 1.) * (height - 5. * rest * rest);
   }
@@ -921,7 +944,8 @@ PetscErrorCode turn(TS, PetscInt, PetscInt *, PetscReal, Vec, PetscBool, void *c
 
 } // namespace
 
-/* A handler that turns a force and leaves the solution alone: the run begins afresh, and in long steps no passage is found twice */
+/* A handler that changes a force but not the solution: the integrator restarts after every event, and finds no passage
+   twice in long steps */
 TEST(Events, ForcesThatAreTurned)
 {
   const PetscInt  direction = 0;
@@ -941,7 +965,7 @@ TEST(Events, ForcesThatAreTurned)
     }
 }
 
-/* TSRollBack() of a run that has not begun, set up or not */
+/* TSRollBack() before the first step is an error, whether the TS has been set up or not */
 TEST(BetweenRuns, NoStepToTakeBack)
 {
   for (const bool setUp : {false, true}) {
@@ -955,7 +979,8 @@ TEST(BetweenRuns, NoStepToTakeBack)
   }
 }
 
-/* A TSSolve() to a time that is past does nothing, and leaves nothing behind: PETSc has cut the step to less than none */
+/* TSSolve() to a time before the present one does nothing. PETSc sets a negative step size there, which must not
+   affect the next run */
 TEST(BetweenRuns, GoOnFromATimeThatIsPast)
 {
   for (const char *options : {"", "-ts_adapt_type none -ts_dt 1e-2 "}) {
@@ -975,7 +1000,8 @@ TEST(BetweenRuns, GoOnFromATimeThatIsPast)
   }
 }
 
-/* Of what begins at zero a relative tolerance is none, and the message says so */
+/* A relative tolerance without an absolute one is refused for coordinates that begin at zero; the message recommends
+   -ts_atol */
 TEST(BetweenRuns, RelativeToleranceFromZero)
 {
   Simulation run(oscillator(), "-ts_rtol 1e-6 -ts_atol 0");
@@ -986,7 +1012,8 @@ TEST(BetweenRuns, RelativeToleranceFromZero)
   EXPECT_NE(trap.message.find("-ts_atol says how small is small"), std::string::npos) << trap.message;
 }
 
-/* Velocities in another vector, whose count of changes happens to be that of the old one */
+/* The user gives another vector of velocities, whose PetscObjectState equals that of the old one; the change must be
+   noticed nevertheless */
 TEST(BetweenRuns, VelocitiesInAnotherVector)
 {
   Simulation       run(oscillator(), fixedSteps(1e-2));
@@ -1010,7 +1037,7 @@ TEST(BetweenRuns, VelocitiesInAnotherVector)
 namespace
 {
 
-/* The second half of a run, after these options were read */
+/* Reads the options again and solves the second half of the run */
 PetscErrorCode secondHalf(Simulation &run, const std::string &options)
 {
   Options in(options);
@@ -1023,7 +1050,7 @@ PetscErrorCode secondHalf(Simulation &run, const std::string &options)
 
 } // namespace
 
-/* TSSetFromOptions() between two runs: the linear solver is chosen once more, and options of SNES hold as they do before the first run */
+/* TSSetFromOptions() between two runs chooses the linear solver again, and options of SNES act as before the first run */
 TEST(BetweenRuns, OptionsReadAgain)
 {
   const Pendulum    p(-90., 0., 1.);
@@ -1050,7 +1077,7 @@ TEST(BetweenRuns, OptionsReadAgain)
   EXPECT_EQ(secondHalf(run, all + "-snes_type ngs"), PETSC_ERR_SUP);
 }
 
-/* Degree -1 is what holds already, whatever the order makes of it */
+/* Reading the same options again changes nothing; degree -1 keeps the present predictor degree, which depends on the order */
 TEST(BetweenRuns, TheSameOptionsReadAgain)
 {
   const Pendulum p(-90., 0., 1.);

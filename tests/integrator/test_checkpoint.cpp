@@ -66,7 +66,7 @@ void sameCounters(const TSHHT3Statistics &a, const TSHHT3Statistics &b)
   EXPECT_EQ(a.h_max, b.h_max);
 }
 
-/* A run with checkpoints against one without */
+/* A run that writes checkpoints gives the same digits and counters as one that does not */
 void unchanged(const Problem &p, const std::string &options, int every)
 {
   SCOPED_TRACE(p.name + " " + options);
@@ -79,7 +79,7 @@ void unchanged(const Problem &p, const std::string &options, int every)
   EXPECT_GT(file.read().size(), 100u);
 }
 
-/* Resumed at every step between two, from a checkpoint that step has left */
+/* Resumes from the checkpoint of each step from `first` to `last` and compares with the uninterrupted run */
 void repeatEach(const Problem &p, const std::string &options, int first, int last)
 {
   SCOPED_TRACE(p.name + " " + options);
@@ -123,7 +123,7 @@ void repeat(const Problem &p, const std::string &options, int every, int interru
 
   Simulation              resumed(p, options + write + "-ts_hhtdae_resume " + kept.name);
   const std::vector<Step> rest = record(resumed);
-  /* the step number goes on, so that the monitor's first call is that of the checkpoint itself */
+  /* The step number continues, so that the first call of the monitor is at the checkpoint itself */
   ASSERT_GE(rest.size() + interrupted, steps.size());
   const size_t offset = rest.size() + interrupted - steps.size();
   ASSERT_LE(offset, (size_t)1);
@@ -139,7 +139,7 @@ void repeat(const Problem &p, const std::string &options, int every, int interru
            options.c_str(), interrupted, (int)(rest.size() - offset), (int)different);
 }
 
-/* The same numbers of unknowns and roles, but a wind of 1e-6 N */
+/* A pendulum with the same numbers of unknowns and roles, but with an additional force of 1e-6 N */
 struct Blown : Pendulum {
   using Pendulum::Pendulum;
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override
@@ -149,7 +149,7 @@ struct Blown : Pendulum {
   }
 };
 
-/* The error of resuming from a file with these bytes; empty if it was taken */
+/* The error message of resuming from a file with these bytes; empty if the file was accepted */
 std::string refusal(const Problem &p, const std::string &bytes, const std::string &options = "")
 {
   const File file("bad");
@@ -196,7 +196,7 @@ TEST(Checkpoint, WritingChangesNothing)
   unchanged(Pendulum(-90., 0., 2.), fixedSteps(.01), 10);
 }
 
-/* Whatever the state of the matrix, of the corrector and of the predictor */
+/* A checkpoint after any step resumes exactly, whatever the state of the matrix, the corrector and the predictor */
 TEST(Checkpoint, AfterEveryStep)
 {
   repeatEach(Andrews(.02), tolerance(1e-6), 1, 120);
@@ -205,7 +205,7 @@ TEST(Checkpoint, AfterEveryStep)
   repeatEach(Sleigh(5.), tolerance(1e-6), 1, 60);
 }
 
-/* The solvers that it may be, and an option that rules the reuse of matrices */
+/* With every direct solver that supports checkpoints, and with an option that rules the reuse of matrices */
 TEST(Checkpoint, OtherSolvers)
 {
   for (const char *options : {"-pc_type lu -pc_factor_mat_solver_type mumpsnd ", "-pc_type lu -pc_factor_mat_solver_type mumpsmixed ", "-pc_type lu -pc_factor_mat_solver_type klupair ", "-pc_factor_mat_solver_type klupair ",
@@ -217,7 +217,7 @@ TEST(Checkpoint, OtherSolvers)
 
 TEST(Checkpoint, FixedSteps) { repeat(Pendulum(-90., 0., 2.), fixedSteps(.01), 30, 90); }
 
-/* By hand, in place of options */
+/* Checkpoints by function calls in place of options */
 TEST(Checkpoint, SaveAndLoad)
 {
   const Pendulum p(-90., 0., 2.);
@@ -238,8 +238,9 @@ TEST(Checkpoint, SaveAndLoad)
   EXPECT_EQ(second.v(), first.v());
 }
 
-/* A TS that has run takes all of the file's state and keeps nothing of its own: the coordinates that its start has found to be driven are not driven in the run of the
-   file, whose pendulum has turned since, Driven.FreeAfterAll */
+/* A TS that has run already takes over the whole state of the file and keeps nothing of its own. Example: its own
+   start found driven coordinates; in the run of the file, whose pendulum has turned, none are driven
+   (Driven.FreeAfterAll) */
 TEST(Checkpoint, LoadedIntoATSThatHasRun)
 {
   const Pendulum p(-90., 2., 2.);
@@ -265,12 +266,13 @@ TEST(Checkpoint, LoadedIntoATSThatHasRun)
   sameCounters(second.statistics(), first.statistics());
 }
 
-/* Whoever of the two gives the option, the run that goes on makes matrices as its own options say */
+/* -snes_lag_jacobian may be an option of the run that writes the checkpoint or of the run that resumes: the resumed
+   run renews matrices according to its own options */
 TEST(Checkpoint, LagOfTheRunThatGoesOn)
 {
   const Pendulum p(-90., 0., 1.);
   const File     file("lag");
-  for (const bool first : {true, false}) { /* whose option it is */
+  for (const bool first : {true, false}) { /* which of the two runs has the option */
     Simulation run(p, tolerance(1e-6) + (first ? "-snes_lag_jacobian 3" : "")), next(p, tolerance(1e-6) + (first ? "" : "-snes_lag_jacobian 1"));
     SNES       snes;
     PetscInt   before, after;
@@ -289,7 +291,7 @@ TEST(Checkpoint, LagOfTheRunThatGoesOn)
   }
 }
 
-/* Points of a time span that the run has behind it are not gone back for. */
+/* Times of a time span before the checkpoint are not visited again */
 TEST(Checkpoint, ResumesInATimeSpan)
 {
   const Pendulum p(-90., 0., 2.);
@@ -313,7 +315,7 @@ TEST(Checkpoint, ResumesInATimeSpan)
   must(TSGetTimeSpanSolutions(second.ts, &m, &y));
   ASSERT_EQ(n, 5);
   ASSERT_EQ(m, 5);
-  for (int k = 0; k < 2; k++) { /* behind the checkpoint */
+  for (int k = 0; k < 2; k++) { /* times after the checkpoint */
     PetscReal norm;
     must(VecNorm(y[k], NORM_2, &norm));
     EXPECT_TRUE(std::isnan(norm)) << k;
@@ -325,7 +327,8 @@ TEST(Checkpoint, ResumesInATimeSpan)
   }
 }
 
-/* A program that calls TSSolve() for one stretch after another is asked for those again that the checkpoint has behind it */
+/* A program that calls TSSolve() for one interval after another may repeat the calls for the intervals before the
+   checkpoint when it resumes */
 TEST(Checkpoint, ResumesInALoopOfSolves)
 {
   const Pendulum p(-90., 0., 2.);
@@ -348,7 +351,7 @@ TEST(Checkpoint, ResumesInALoopOfSolves)
   EXPECT_EQ(second.u(), first.u());
 }
 
-/* The file's own checksum (FNV-1a over all but its last eight bytes) made right again */
+/* Corrects the checksum of a changed file: FNV-1a over all bytes but the last eight */
 static void seal(std::string &file)
 {
   std::uint64_t sum = 14695981039346656037ull;
@@ -434,7 +437,7 @@ TEST(Checkpoint, UnwritableDirectoryIsAnError)
 namespace
 {
 
-/* The residual of a simulation, which fails once, at a call that is counted */
+/* The residual of a simulation that fails once, at a given call */
 struct FailsOnce {
   TSI2Function f   = nullptr;
   void        *ctx = nullptr;
@@ -454,7 +457,8 @@ struct FailsOnce {
 
 } // namespace
 
-/* What was reached before an error in a callback can be looked at, saved, and gone on from, with the digits of a run without error */
+/* After an error in a callback the last accepted state can be read, saved and continued from, with the digits of a run
+   without the error */
 TEST(Checkpoints, AfterAnErrorOfTheApplication)
 {
   const Pendulum p(-90., 0., .5);

@@ -24,8 +24,8 @@ struct DenseErrors {
   double q = 0., v = 0., a = 0., s = 0., lambda = 0.;
 };
 
-/* What interpolation adds between steps: error there minus the errors at both ends, weighted linearly (these are
-   smooth). Fixed steps to t = 1/2, the second half of them looked at. */
+/* The part of the interpolation error that interpolation itself adds: error between steps minus the linearly
+   interpolated errors at both ends (which are smooth). Fixed steps to t = 1/2, evaluated in the second half */
 DenseErrors betweenSteps(const Problem &p, double h, const std::string &options)
 {
   Simulation  run(p, fixedSteps(h) + options);
@@ -94,12 +94,12 @@ TEST(Dense, ThirdOrder)
     expectThirdOrder(Pendulum(-60., 1., 1.), .02, options);
     expectThirdOrder(UserVars(1.), .004, options);
   }
-  /* in the paper's form the unknown a_{n+1} counts as q''_{n+1}, from which it differs by O(alpha h): the slopes of q'
-   */
+  /* In the paper's form the unknown a_{n+1} is used as q''_{n+1}, from which it differs by O(alpha h); this affects
+     the slopes of q' */
   expectThirdOrder(Pendulum(-60., 1., 1.), .02, "-ts_hhtdae_form paper", 1.9);
 }
 
-/* Over a whole run the error between steps is that at the steps */
+/* Over a whole run the error between steps is no larger than that at the steps */
 TEST(Dense, AsGoodAsTheSteps)
 {
   const Pendulum p(-90., 0., 2.);
@@ -146,7 +146,7 @@ TEST(Dense, ExactAtBothEnds)
     double     t = 0.;
     for (int step = 0; step < 50; step++) {
       must(run.step());
-      if (step) { /* the begin of this step is the end of the last one */
+      if (step) { /* the beginning of this step is the end of the last one */
         must(TSHHT3Interpolate(run.ts, t, x.U, x.V, x.A));
         EXPECT_EQ(whole(x.U), u);
         EXPECT_EQ(whole(x.V), v);

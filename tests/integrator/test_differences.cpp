@@ -1,4 +1,5 @@
-/* Jacobians: none given, and the Newton matrix against differences of the integrator's residual */
+/* Jacobians by differences where the application gives none, and the Newton matrix against differences of the
+   integrator's residual */
 #include "support.h"
 
 #include <algorithm>
@@ -11,13 +12,13 @@ using namespace hhtest;
 namespace
 {
 
-/* The end of a run */
+/* State at the end of a run */
 struct End {
   Array            u, v;
   TSHHT3Statistics statistics;
 };
 
-/* A TS of the problem's residual alone */
+/* A TS with the residual of the problem and no Jacobian */
 struct WithoutJacobian {
   TS  source, ts;
   Vec U, V, F;
@@ -94,12 +95,12 @@ TEST(Differences, GiveTheSameAnswer)
     MEASURED("%-15s without a Jacobian: differs by %.1e in q, %.1e in q'; %d residuals in place of %d, %d steps, %d",
              f.name, du, dv, (int)end.statistics.residuals, (int)run.statistics().residuals, (int)end.statistics.steps,
              (int)run.statistics().steps);
-    EXPECT_LT(du, 1e-5); /* the rates of a start have four digits */
+    EXPECT_LT(du, 1e-5); /* the rates at the start are computed to four digits */
     EXPECT_LT(dv, 1e-5);
   }
 }
 
-/* A pendulum with a matrix for colored differences that has no place for its constraint's derivatives, or all places */
+/* A pendulum whose matrix for colored differences lacks the entries of the constraint, or has all entries */
 TEST(Differences, MatricesWithoutPlaces)
 {
   for (bool roles : {false, true})
@@ -177,8 +178,9 @@ TEST(Differences, AMatrixThatWasNeverAssembled)
   must(MatDestroy(&P));
 }
 
-/* The matrix D_r J D_c of the steps against PETSc's differences of the scaled residual. Where unknowns vanish PETSc's
-   increments are too small for rounding, above all in the first step; the median does not see that. */
+/* The matrix D_r J D_c of the steps against PETSc's differences of the scaled residual. PETSc's increments for
+   vanishing unknowns are too small compared with rounding, above all in the first step; the median of all checks is
+   insensitive to these */
 TEST(Differences, SnesTestJacobian)
 {
   for (const Factory &f : allProblems()) {
@@ -198,14 +200,15 @@ TEST(Differences, SnesTestJacobian)
       std::sort(d.begin(), d.end());
       MEASURED("%-15s %-12s matrix against differences: median %.1e, worst %.1e of %d", f.name, form, d[d.size() / 2],
                d.back(), (int)d.size());
-      /* andrews: h < 1e-3 leaves little of PETSc's increments in the positions */
+      /* andrews: for h < 1e-3 PETSc's increments change the positions too little */
       EXPECT_LT(d[d.size() / 2], p->name == "andrews" ? 5e-3 : 2e-4);
       EXPECT_LT(d.back(), 1e-2);
     }
   }
 }
 
-/* From U = 0, where x + d - d is not x: places of the matrix are those of the springs, three a row */
+/* Starting from U = 0, where x + d - d differs from x by rounding, the detected nonzero pattern still has only the
+   three entries per row of the springs */
 TEST(Differences, NoPlaceThatNobodyFollows)
 {
   struct Springs : Problem {
@@ -244,12 +247,13 @@ TEST(Differences, StepsOfTheUser)
 {
   const Pendulum p(-30., 0., .1);
   const Array    u = withoutJacobian(p, tolerance(1e-5)).u;
-  EXPECT_EQ(withoutJacobian(p, tolerance(1e-5) + "-mat_fd_coloring_umin 2").u, u); /* only of the type ds */
+  EXPECT_EQ(withoutJacobian(p, tolerance(1e-5) + "-mat_fd_coloring_umin 2").u, u); /* has an effect with type ds only */
   EXPECT_NE(withoutJacobian(p, tolerance(1e-5) + "-mat_fd_coloring_err 1e-4").u, u);
   EXPECT_NE(withoutJacobian(p, tolerance(1e-5) + "-mat_fd_type ds -mat_fd_coloring_umin 1e-3").u, withoutJacobian(p, tolerance(1e-5) + "-mat_fd_type ds").u);
 }
 
-/* An inertia of 1 that is lost in rounding of a force of 1e13 would make a variable of its coordinate; so would one of 1e-6 beside one of 1 */
+/* An inertia of 1 that is lost in the rounding of a force of 1e13 would let its coordinate be taken for a variable;
+   the same holds for an inertia of 1e-6 beside one of 1 */
 TEST(Differences, InertiaBesideStiffSprings)
 {
   struct Springs : Problem {
@@ -280,7 +284,8 @@ TEST(Differences, InertiaBesideStiffSprings)
 namespace
 {
 
-/* A point mass on a rod of length L in Cartesian coordinates, released from the horizontal; in units in which L and T = sqrt(L/g) may be anything */
+/* A point mass on a rod of length L in Cartesian coordinates, released from the horizontal, in arbitrary units of
+   length and of time: L and T = sqrt(L/g) */
 struct Released : Problem {
   double L, g;
   Released(double length, double gravity) : L(length), g(gravity)
@@ -304,7 +309,7 @@ struct Released : Problem {
   void jacobian(double, const double *, const double *, const double *, double, double, Entries &) const override {}
 };
 
-/* Steps and the place where it ends, over L */
+/* Number of steps, and final position over L */
 std::pair<PetscInt, double> fall(double L, double g)
 {
   const Released p(L, g);
@@ -314,7 +319,8 @@ std::pair<PetscInt, double> fall(double L, double g)
 
 } // namespace
 
-/* Multipliers as small as probes are make products with coordinates that forces hide */
+/* Multipliers as small as the probing increments make products with coordinates that are lost in the rounding of large
+   forces */
 TEST(Differences, MultipliersBesideLargeForces)
 {
   const auto one = fall(1., 9.81);
@@ -325,7 +331,7 @@ TEST(Differences, MultipliersBesideLargeForces)
   }
 }
 
-/* Squares of large positions hide small moves of those that begin at zero */
+/* The squares of large positions hide small changes of positions that begin at zero */
 TEST(Differences, LargePositions)
 {
   const auto one = fall(1., 9.81);
@@ -339,7 +345,8 @@ TEST(Differences, LargePositions)
 namespace
 {
 
-/* A pendulum whose functions and matrix are those of a DM; with `places` its matrix has all of them, else the diagonal */
+/* A pendulum whose functions and matrix are attached to a DM; the matrix has all entries if `places` is set, otherwise
+   only the diagonal */
 class PendulumOfADM
 {
 public:
@@ -395,7 +402,8 @@ private:
 
 } // namespace
 
-/* A matrix of the DM that has no place for derivatives of constraints: -snes_fd finds all places, with a Jacobian of the application's and without */
+/* The DM's matrix has no entries for derivatives of constraints: -snes_fd finds the complete nonzero pattern, with and
+   without a Jacobian of the application */
 TEST(Differences, AllPlacesOfADM)
 {
   PendulumOfADM given(true, true, tolerance(1e-5)), found(false, false, tolerance(1e-5) + "-snes_fd");
@@ -404,7 +412,7 @@ TEST(Differences, AllPlacesOfADM)
   EXPECT_LT(relativeDifference(whole(found.U), whole(given.U)), 1e-6);
 }
 
-/* A run that goes on from a checkpoint calls the Jacobian of the DM, as the whole one has */
+/* A run resumed from a checkpoint calls the Jacobian of the DM, as the uninterrupted run does */
 TEST(Checkpoint, JacobianOfADM)
 {
   const std::string file = testing::TempDir() + "hhtdae-jacobian-of-a-dm-" + std::to_string((long)getpid()), reuse = tolerance(1e-5) + "-ts_hhtdae_reuse 1,0,1 ";

@@ -22,7 +22,7 @@ struct Sample {
 };
 
 struct SampleErrors {
-  double a = 0., other = 0.; /* q''; multipliers, variables and force states */
+  double a = 0., other = 0.; /* errors of q'' (a), and of multipliers, variables and force states (other) */
   void   take(const Problem &p, const std::array<Array, 3> &e)
   {
     for (PetscInt i = 0; i < p.n; i++) {
@@ -32,8 +32,8 @@ struct SampleErrors {
   }
 };
 
-/* Errors at the ends of steps, of samples between them, and of linear interpolation there; fixed steps to t = 1/2, the second half of
-   them looked at */
+/* Errors at the ends of steps, of samples between them, and of linear interpolation at the same times; fixed steps to
+   t = 1/2, evaluated in the second half */
 struct Compared {
   SampleErrors ends, samples, linear;
   Compared(const Problem &p, double h, const std::string &options)
@@ -65,7 +65,7 @@ struct Compared {
   }
 };
 
-/* Of second order, and about as accurate as the steps themselves */
+/* The error of samples is of second order and about as large as that of the steps */
 void expectOrder(const Problem &p, double h, const std::string &options = "")
 {
   const Compared c(p, h, options), f(p, h / 2., options);
@@ -81,7 +81,7 @@ void expectOrder(const Problem &p, double h, const std::string &options = "")
   }
 }
 
-/* Rows of motion, states and definitions, relative to the largest multiplier or force that enters */
+/* Largest residual of the equations of motion, states and definitions, relative to the largest multiplier or force in them */
 double imbalance(Simulation &run, const Sample &x, double t)
 {
   Vec F;
@@ -110,8 +110,8 @@ TEST(EvaluateAt, OrderBetweenSteps)
   }
 }
 
-/* Every sample satisfies the equations of motion, states and definitions, whatever the problem; and both ends are the step's own */
-/* Differences of the constraints over a step far shorter than the motion's time scale would be rounding */
+/* Within a step far shorter than the time scale of the motion, differences of the constraints over the step would be
+   dominated by rounding */
 TEST(EvaluateAt, WithinAShortStep)
 {
   const Pendulum p(-60., 1., 1.);
@@ -128,6 +128,8 @@ TEST(EvaluateAt, WithinAShortStep)
   EXPECT_LT(worst, 1e-4);
 }
 
+/* For every problem, samples satisfy the equations of motion, states and definitions, and samples at the ends of a step
+   have the values of the step */
 TEST(EvaluateAt, EquationsHold)
 {
   for (const Factory &f : allProblems())
@@ -161,7 +163,7 @@ TEST(EvaluateAt, EquationsHold)
     }
 }
 
-/* A run with samples is the run without, to the last bit and count */
+/* A run with samples has the same digits and counters as the run without */
 TEST(EvaluateAt, LeavesTheRunAlone)
 {
   for (const Factory &f : allProblems())
@@ -194,13 +196,14 @@ TEST(EvaluateAt, LeavesTheRunAlone)
     }
 }
 
-/* Nor do samples change with what is written or read between them: those of a resumed run are those of the whole one */
+/* Checkpoints written or read between samples do not change the samples: those of a resumed run equal those of the
+   uninterrupted one */
 TEST(EvaluateAt, SamplesOfAResumedRun)
 {
   for (const Factory &f : allProblems()) {
     const auto                        p    = f.make();
     const std::string                 file = testing::TempDir() + "samples_" + f.name + ".checkpoint";
-    std::vector<std::array<Array, 3>> values[3]; /* the whole run, one that writes, one that resumes */
+    std::vector<std::array<Array, 3>> values[3]; /* of the uninterrupted run, the run that writes, the run that resumes */
     const auto                        samples = [&](Simulation &run, int first, int last, std::vector<std::array<Array, 3>> &to) {
       Sample x(run.U);
       double begin = run.t();
@@ -228,7 +231,7 @@ TEST(EvaluateAt, SamplesOfAResumedRun)
   }
 }
 
-/* Times of a grid that steps end on but for rounding take what the step has there, and solve nothing */
+/* Times of a grid on which steps end, except for rounding, take the values at the end of the step and solve nothing */
 TEST(EvaluateAt, OnAGridOfSteps)
 {
   const DoublePendulum p(1.);
@@ -245,7 +248,7 @@ TEST(EvaluateAt, OnAGridOfSteps)
   }
 }
 
-/* With a user's own solver */
+/* With other linear solvers chosen by the user */
 TEST(EvaluateAt, OtherSolvers)
 {
   const DoublePendulum p(1.);
@@ -256,7 +259,7 @@ TEST(EvaluateAt, OtherSolvers)
     const double t = run.t() - 1e-3;
     must(TSHHT3EvaluateAt(run.ts, t, x.U, x.V, x.A));
     EXPECT_LT(imbalance(run, x, t), 1e-9) << options;
-    must(TSHHT3EvaluateAt(run.ts, t, nullptr, nullptr, x.A)); /* any of the three */
+    must(TSHHT3EvaluateAt(run.ts, t, nullptr, nullptr, x.A)); /* any of the output vectors may be absent */
     EXPECT_EQ(whole(x.A), x.values()[2]);
   }
 }
@@ -278,7 +281,7 @@ TEST(EvaluateAt, RefusesOtherTimes)
 namespace
 {
 
-/* An application that finds what it knows of its operator in the operator */
+/* A Jacobian function that finds its data through the context of the operator J */
 PetscErrorCode byItsContext(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal sv, PetscReal sa, Mat J, Mat P, void *)
 {
   OperatorData *d = nullptr;
@@ -290,7 +293,8 @@ PetscErrorCode byItsContext(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal s
 
 } // namespace
 
-/* A product cannot be had twice: accelerations by linear interpolation */
+/* An operator that is a MATSHELL of the application cannot be duplicated for the evaluation of a sample; accelerations
+   are then interpolated linearly */
 TEST(EvaluateAt, BesideAProductOfTheApplication)
 {
   const DoublePendulum p(1.);
@@ -314,7 +318,7 @@ TEST(EvaluateAt, BesideAProductOfTheApplication)
   must(MatDestroy(&data.values));
 }
 
-/* Nor can a preconditioner whose parts the program has given */
+/* The same holds for a preconditioner whose parts the program has supplied */
 TEST(EvaluateAt, PreconditionersWithParts)
 {
   const DoublePendulum p(1.);

@@ -1,4 +1,5 @@
-/* Starts from rest of runs that are long for the loads and motions that set in: 100 Hz in 100 s, periods that parts of the run hold wholly */
+/* Starts from rest of runs that are long compared with the time scale of loads and motions, for example 100 Hz in 100
+   s; many parts of such a run contain a whole number of periods */
 #include "integrator/start/start.h"
 #include "support.h"
 
@@ -7,7 +8,8 @@ using namespace hhtest;
 namespace
 {
 
-/* A mass of 2 kg on a rail, driven by q = s(t), beside a free one of 1 kg with the load s(t): at rest at first */
+/* A mass of 2 kg on a rail with prescribed position q = s(t), beside a free mass of 1 kg with the load s(t); both
+   begin at rest */
 struct Shaken : Problem {
   const double w, phase;
   Shaken(double frequency, double end, bool cosine) : w(2. * M_PI * frequency), phase(cosine ? M_PI / 2. : 0.)
@@ -47,7 +49,8 @@ Array accelerations(Simulation &run)
 
 } // namespace
 
-/* Differences over parts of the run met whole periods: no acceleration at the start, and a false alarm about the velocities */
+/* Differences over fractions of the run that are whole numbers of periods would see no motion: the initial
+   acceleration would be zero, and the initial velocities would wrongly be reported as inconsistent */
 TEST(Excitation, FastForTheRun)
 {
   for (double end : {1., 100., 1000.})
@@ -64,7 +67,7 @@ TEST(Excitation, FastForTheRun)
       }
 }
 
-/* The first step, a part of the run where nothing else tells how long it may be, was far longer than the period */
+/* Without any other information the first step was a fraction of the run, far longer than the period of the load */
 TEST(Excitation, TheFirstStepFollowsTheLoad)
 {
   for (double end : {10., 1000.})
@@ -78,7 +81,7 @@ TEST(Excitation, TheFirstStepFollowsTheLoad)
       }
 }
 
-/* No frequency has its periods in all samples */
+/* Sampling times are chosen such that no frequency has whole periods at all of them */
 TEST(Excitation, ManyFrequencies)
 {
   for (double end : {1., 100., 1e4})
@@ -94,7 +97,7 @@ TEST(Excitation, ManyFrequencies)
 namespace
 {
 
-/* The same driven by a single pulse at the start, one period long, and nothing afterwards */
+/* The same masses under a single pulse at the start, one period long */
 struct Pushed : Shaken {
   Pushed(double duration, double end) : Shaken(1. / duration, end, true) {}
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override { Shaken::residual(std::min(t, 2. * M_PI / w), u, v, a, f); }
@@ -113,7 +116,8 @@ TEST(Excitation, APulseAtTheStart)
   }
 }
 
-/* Its positions move by less than the tolerance, and nothing holds the velocities that steps of any length leave of it */
+/* If steps are longer than the period of a load whose displacements are below the tolerance, the velocities are wrong
+   without any error estimate noticing; the integrator warns once */
 TEST(Excitation, UnfollowedIsTold)
 {
   const std::string told = "does not follow loads";
@@ -132,7 +136,7 @@ TEST(Excitation, UnfollowedIsTold)
     must(run.solve());
     EXPECT_EQ(out.text(), "") << options;
   }
-  for (double part : {.5, .1, 1e-2, 1e-3, 1e-4}) { /* over before most steps */
+  for (double part : {.5, .1, 1e-2, 1e-3, 1e-4}) { /* the pulse ends before most steps begin */
     const Pushed p(part * 20., 20.);
     Printed      out;
     Simulation   run(p, tolerance(1e-2));
@@ -141,20 +145,21 @@ TEST(Excitation, UnfollowedIsTold)
   }
 }
 
-/* What depends on nothing but the state pays a few residuals, and at rest no differences of constraints */
+/* For a system at rest that depends on the state only, the search for excitation costs few residuals, and constraints
+   are not differenced */
 TEST(Excitation, NoneAtRest)
 {
   const Pendulum p(0., 0., 10.);
   Simulation     run(p, tolerance(1e-4) + "-ts_max_steps 1");
   must(run.step());
   MEASURED("pendulum from rest: %d residuals, %d factorizations in the first step", (int)run.statistics().residuals, (int)run.statistics().factorizations);
-  EXPECT_LT(run.statistics().residuals, 107); /* 89 of them look ahead where the first step moves next to nothing */
+  EXPECT_LT(run.statistics().residuals, 107); /* 89 of them look for loads ahead, since the first step hardly moves anything */
 }
 
 namespace
 {
 
-/* A free mass of 1 under a load that is a function of time, from rest */
+/* A free mass of 1 kg under a load that is a function of time, from rest */
 struct PushedLater : Problem {
   double (*const load)(double);
   PushedLater(double (*f)(double), double end) : load(f)
@@ -179,12 +184,13 @@ double speedAtTheEnd(double (*load)(double), double end)
 
 } // namespace
 
-/* All is at rest until a load of 1 acts, of which the end of the run knows nothing */
+/* The system is at rest until a load of 1 sets in, of which neither the start nor the end of the run shows anything */
 TEST(Excitation, WhatSetsInLater)
 {
   EXPECT_NEAR(speedAtTheEnd([](double t) { return t > 3. && t < 7. ? 1. : 0.; }, 10.), 4., 1e-2);
   EXPECT_NEAR(speedAtTheEnd([](double t) { return t > 30. && t < 70. ? 1. : 0.; }, 1000.), 40., 1e-1);
-  /* of each half period one step sees the end, whenever it is (tripled, steps went to 5 times the distance and more) */
+  /* A step ends within each half period, wherever it is (with growth by 3 in place of 2 the error of the distance was
+     a factor of 5 and more) */
   for (double end : {10., 10.25, 20.25}) {
     const PushedLater square([](double t) { return std::sin(2. * M_PI * t) >= 0. ? 1. : -1.; }, end);
     Simulation        run(square, tolerance(1e-6));
@@ -193,8 +199,9 @@ TEST(Excitation, WhatSetsInLater)
   }
 }
 
-/* A block on a guide that creeps until a load sets in at t = 0.5, beside a mass that hardly swings: the accelerations are drowned in rounding of the constraint in steps of any
-   length, and Taylor's series has to see by itself that it has missed the load */
+/* A block that creeps along a guide until a load sets in at t = 0.5, beside an oscillator of tiny amplitude. In steps
+   of any length the accelerations are below the rounding of the constraint, so that steps are made by Taylor's series;
+   these must notice the load */
 TEST(Excitation, WhereAccelerationsAreNextToNothing)
 {
   struct Block : Problem {
@@ -237,7 +244,7 @@ TEST(Excitation, WhereAccelerationsAreNextToNothing)
   }
 }
 
-/* Nor by a TS that has made longer steps in a run before */
+/* A load that sets in later is also found by a TS that has made longer steps in an earlier run */
 TEST(Excitation, WhatSetsInLaterInANewRun)
 {
   static bool       pushed;
@@ -257,8 +264,8 @@ TEST(Excitation, WhatSetsInLaterInANewRun)
   EXPECT_NEAR(run.v()[0], 1., 1e-2);
 }
 
-/* What is a fortieth of the run long is not stepped over, whenever it comes and however long nothing has moved before; nor what comes and goes smoothly, of which the first
-   samples of the start have seen a trace */
+/* A pulse of a fortieth of the run is not stepped over, whenever it comes and however long nothing has moved before;
+   nor is a smooth pulse, of which the samples of the start have seen only a trace */
 TEST(Excitation, InTheMiddleOfTheRun)
 {
   static double begin;
@@ -272,7 +279,7 @@ TEST(Excitation, InTheMiddleOfTheRun)
     EXPECT_NEAR(speedAtTheEnd([](double t) { return std::exp(-8. * (t - begin) * (t - begin)) * std::sqrt(8. / M_PI); }, 10.), 1., 2e-2) << begin;
 }
 
-/* Of a run that has no final time, nobody looks at its end */
+/* In a run without a final time no loads are evaluated near the end of the run */
 TEST(Excitation, RunsWithoutEnd)
 {
   static double latest;
@@ -284,7 +291,8 @@ TEST(Excitation, RunsWithoutEnd)
   EXPECT_GT(run.t(), 1e-3);
 }
 
-/* The end that the first part of a run has looked at is not the end of what follows, nor is it that of a checkpoint */
+/* When a run is continued beyond its old final time, or resumed from a checkpoint, the search for loads covers the new
+   interval */
 TEST(Excitation, InARunThatGoesOn)
 {
   const PushedLater p([](double t) { return t > 5. && t < 7. ? .5 : 0.; }, 2.);
@@ -305,7 +313,8 @@ TEST(Excitation, InARunThatGoesOn)
 namespace
 {
 
-/* A thrust of 5 + 30 sin(50 t), and its moments about the centres of mass of bodies that it passes through, turned by an angle each: rounding alone */
+/* A thrust of 5 + 30 sin(50 t), and moments of this thrust about points on its line of action, which are zero except
+   for rounding */
 struct Cancelled : Problem {
   Cancelled()
   {
@@ -332,7 +341,7 @@ struct Cancelled : Problem {
 
 } // namespace
 
-/* Forces whose moments cancel swing as they do, not as the rounding of their sum does */
+/* The time scale of loads that cancel is that of the loads, not that of the rounding errors of their sum */
 TEST(Excitation, OfLoadsThatCancel)
 {
   const Cancelled p;

@@ -1,4 +1,5 @@
-/* A package says through its preconditioner that it cannot factor a matrix; every other error goes up as it is */
+/* A package that cannot factor a matrix reports it through its preconditioner, and the step is repeated or refused;
+   every other error of a package is returned unchanged */
 #include "support.h"
 
 #include <petsc/private/matimpl.h>
@@ -8,9 +9,9 @@ using namespace hhtest;
 namespace
 {
 
-/* A package whose factorizations go wrong as told */
+/* A package (klupair with changed functions) whose factorizations fail as described here */
 struct Faulty {
-  int            calls = 0, at = 0, until = 1 << 30; /* the call that fails, and those that follow up to another */
+  int            calls = 0, at = 0, until = 1 << 30; /* factorizations so far; those from `at` to `until` fail */
   PetscErrorCode code  = 0;
   MatFactorError error = MAT_FACTOR_NOERROR;
 };
@@ -97,7 +98,7 @@ TEST(FactorErrors, SingularMatricesCutTheStep)
   f.until                   = 1 << 30;
   const std::string message = runFaulty(f, &code);
   EXPECT_NE(code, 0);
-  EXPECT_NE(message.find("faulty has met a zero pivot"), std::string::npos) << message; /* in a start in the place of steps that are too short */
+  EXPECT_NE(message.find("faulty has met a zero pivot"), std::string::npos) << message; /* from the start that replaces too short steps */
   const std::string at_once = runFaulty(f, &code, nullptr, "-ts_max_reject 0 -ts_dt 1e-3 -ts_adapt_dt_max 1e-3 -ts_hhtdae_reuse 1,0,1");
   EXPECT_NE(at_once.find("singular, or a pivot of it too small for faulty"), std::string::npos) << at_once;
 }

@@ -8,7 +8,7 @@ using namespace hhtest;
 namespace
 {
 
-/* A state that follows cos(3 t/T) within T */
+/* A state that follows cos(3 t/T) with the time constant T */
 struct Follower : Problem {
   const double T;
   explicit Follower(double unit) : T(unit)
@@ -59,7 +59,8 @@ TEST(FirstStep, StatesInAnyUnitOfTime)
 namespace
 {
 
-/* A lag of 2 ms between 0 and 10 beside a mass at rest, which a constraint may guide; its input jumps at `jump`, where the integration restarts */
+/* A first-order lag of 2 ms whose input jumps from 0 to 10 at `jump`, where the integration restarts; beside a mass at
+   rest and, if `guided`, a second mass held by a constraint */
 struct SwitchedLag : Problem {
   const bool     guided;
   const double   lag = 2e-3, jump;
@@ -109,7 +110,8 @@ double errorOfSwitchedLag(const SwitchedLag &p, const std::string &options)
 
 } // namespace
 
-/* At rest steps have become long: the first one after a restart is judged by what states do in it */
+/* Steps have become long while the system was at rest; the length of the first step after the restart must follow from
+   the states */
 TEST(FirstStep, StatesAfterARestart)
 {
   for (bool guided : {false, true})
@@ -120,7 +122,8 @@ TEST(FirstStep, StatesAfterARestart)
     }
 }
 
-/* All accelerations are rounding there, which makes no step so short that states may be carried through it by Taylor's series */
+/* Beside a mechanism at rest, whose accelerations are all rounding errors, steps are not treated as too short for the
+   corrector: states must not be extrapolated by Taylor's series */
 TEST(FirstStep, StatesBesideAMechanismAtRest)
 {
   for (double eps : {1e-6, 1e-8, 1e-10}) {
@@ -130,7 +133,7 @@ TEST(FirstStep, StatesBesideAMechanismAtRest)
   }
 }
 
-/* Their error follows the tolerance at every spectral radius */
+/* The error of states is about the same for every spectral radius */
 TEST(FirstStep, StatesOfEveryRadius)
 {
   PetscInt steps;
@@ -144,7 +147,7 @@ TEST(FirstStep, StatesOfEveryRadius)
   EXPECT_LT(most, 4. * least);
 }
 
-/* Steps from a restart are of second order, though s changes by far more than the tolerance within one */
+/* Steps after a restart are of second order, although s' changes the state by far more than the tolerance within one step */
 TEST(BetweenRuns, RestartsOfStates)
 {
   PetscInt steps;

@@ -1,4 +1,5 @@
-/* A first step that the user has set stands, however it was set; otherwise it is chosen, whether options were read or not */
+/* A first step that the user has set is used, however it was set; otherwise the first step is chosen, whether options
+   were read or not */
 #include "integrator/start/start.h"
 #include "support.h"
 #include <vector>
@@ -19,7 +20,7 @@ public:
     TS made;
     must(ProblemCreateTS(PETSC_COMM_SELF, problem_, &made, &U_, &V_, false));
     ts = made;
-    must(TSSetTimeStep(ts, .1)); /* as TSCreate() leaves it */
+    must(TSSetTimeStep(ts, .1)); /* the value of TSCreate() */
     must(TSSetTolerances(ts, 1e-4, nullptr, 1e-4, nullptr));
     if (before) must(before(ts));
     must(TSSetType(ts, TSHHT3));
@@ -62,11 +63,12 @@ TEST(FirstStep, IsChosenWithoutAWordOfTheUser)
   const double chosen = p.first();
   must(TSSetFromOptions(q.ts));
   MEASURED("first step %g", chosen);
-  EXPECT_GT(std::abs(chosen - .1), 1e-3); /* or the tests below would show nothing */
+  EXPECT_GT(std::abs(chosen - .1), 1e-3); /* otherwise the tests below would show nothing */
   EXPECT_EQ(q.first(), chosen);
 }
 
-/* From rest accelerations begin to change with the square of the time: the first step is one like those that follow, whatever rounding makes of its rates */
+/* From rest, the accelerations of a pendulum begin to change with the square of the time, so that their rates at the
+   start are rounding errors. The first step must be about as long as those that follow */
 TEST(FirstStep, FromRest)
 {
   for (double eps : {1e-3, 1e-5, 1e-7, 1e-9}) {
@@ -86,7 +88,7 @@ TEST(FirstStep, FromRest)
   }
 }
 
-/* Of fixed length it knows no tolerance: the start is as good as the method at any */
+/* A first step of fixed length does not depend on the tolerance: the multiplier is of second order at any tolerance */
 TEST(FirstStep, OfFixedLengthIsOfSecondOrderAtAnyTolerance)
 {
   const Pendulum p(-60., 2., 10.);
@@ -108,7 +110,7 @@ TEST(FirstStep, SetByTheProgram)
     Program p, q, r;
     must(TSSetTimeStep(p.ts, h));
     EXPECT_EQ(p.first(), h);
-    must(TSSetUp(q.ts)); /* only then */
+    must(TSSetUp(q.ts)); /* set only after TSSetUp() */
     must(TSSetTimeStep(q.ts, h));
     EXPECT_EQ(q.first(), h);
     Options none("");

@@ -1,4 +1,4 @@
-/* The formulas by what they promise: exact for polynomials, consistent with each other, error constants measured */
+/* The formulas of the method are exact for polynomials and consistent with each other; error constants are measured */
 #include "integrator/step/bdf.h"
 
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 using namespace hht3;
 
-/* Spectral radius of one step of HHT for q'' = -w^2 q, h = 1, by the growth of a run of it */
+/* Spectral radius of one step of HHT for q'' = -w^2 q, h = 1, measured by the growth of a run of it */
 static double Growth(double alpha, double gamma, double beta, double w)
 {
   const int    steps = 4000;
@@ -29,13 +29,14 @@ TEST(Formulas, HHTParametersOfThePaper)
 {
   for (double alpha : {0., -.05, -.3, -1. / 3.}) {
     const Parameters p = HHTParameters(alpha, true);
-    /* a step of length 1 from q = v = a = 0 with the force t: (9a) gives the acceleration, (2) the position, which misses 1/6 by k times the change of a */
+    /* A step of length 1 from q = v = a = 0 with the force t: (9a) gives the acceleration, (2) the position, whose
+       error from 1/6 is k times the change of a */
     const double a = 1 / p.ca(), q = p.beta * a;
     EXPECT_NEAR(a, 1 + alpha, 1e-15);
     EXPECT_NEAR(q - 1. / 6., p.k * a, 1e-15) << alpha;
-    /* the double root at infinite frequency */
+    /* The spectral radius at infinite frequency is a double root */
     EXPECT_NEAR(Growth(alpha, p.gamma, p.beta, 1e8), p.rho, 1e-3) << alpha;
-    /* of second order and free of damping at low frequencies: a period of 1,000 steps */
+    /* Of second order and without damping at low frequencies, here with 1,000 steps per period */
     EXPECT_NEAR(Growth(alpha, p.gamma, p.beta, 2 * M_PI / 1000), 1, 1e-6) << alpha;
   }
   EXPECT_DOUBLE_EQ(HHTParameters(0, true).k, 1. / 12.);
@@ -84,7 +85,7 @@ TEST(Formulas, ErrorConstantOfThePosition)
     const Parameters p = RadiusParameters(rho);
     const double     h = .5, a0 = p.lag() * h, a1 = (1 + p.lag()) * h;
     EXPECT_NEAR(NewmarkPosition(p, h, 0., 0., a0, a1) - h * h * h / 6, p.k * h * h * (a1 - a0), 1e-15);
-    EXPECT_NEAR(NewmarkVelocity(p, h, 0., a0, a1), h * h / 2, 1e-15); /* exact in q': what the lag is for */
+    EXPECT_NEAR(NewmarkVelocity(p, h, 0., a0, a1), h * h / 2, 1e-15); /* q' is exact, which is the purpose of the lag */
   }
   for (double alpha : {-.05, -.3}) {
     const Parameters p = HHTParameters(alpha, false);
@@ -94,7 +95,8 @@ TEST(Formulas, ErrorConstantOfThePosition)
   }
 }
 
-/* s = t^3/6 in steps of 1, of which w is a polynomial of second degree, too; the backward differentiation of second order has 1/3 */
+/* s = t^3/6 in steps of 1, where w is a polynomial of second degree; for comparison, the error constant of backward
+   differentiation of second order is 1/3 */
 TEST(Formulas, ErrorConstantOfAState)
 {
   for (double rho : {0., .1, .3, .5, .9, 1.}) {
@@ -117,7 +119,7 @@ TEST(Formulas, ScalingsAndShiftsBelongTogether)
     const Parameters p = HHTParameters(-.2, true);
     EXPECT_NEAR(ShiftA(p, h) * ScalePosition(p, h) / p.ca(), 1., 1e-14);
     EXPECT_NEAR(ShiftV(p, h) * ScalePosition(p, h) / ScaleVelocity(p, h), 1., 1e-14);
-    /* a state's column: d s'/d w over d s/d w is the same sigma_v */
+    /* for the column of a state, d s'/d w over d s/d w is the same sigma_v */
     const double dw = (1 - p.am_s) / (1 - p.af_s);
     EXPECT_NEAR(ShiftV(p, h) * ScaleState(p, h) / dw, 1., 1e-13);
   }
@@ -131,7 +133,7 @@ TEST(Formulas, CorrectorStopsByTheRate)
   EXPECT_EQ(CorrectorError(2., 1.), PETSC_MAX_REAL);
 }
 
-/* Backward differentiation: textbook values at constant steps, and at others exact for polynomials of its order */
+/* Backward differentiation: textbook values at constant steps; at variable steps exact for polynomials up to its order */
 TEST(Formulas, BackwardDifferentiation)
 {
   const double constant[] = {0., 1., 2. / 3., 6. / 11., 12. / 25., 60. / 137.};
@@ -168,7 +170,7 @@ TEST(Formulas, BackwardDifferentiation)
   }
 }
 
-/* At the nodes exactly one value, between them polynomials */
+/* Lagrange weights are exact at the nodes and reproduce polynomials between them */
 TEST(Formulas, LagrangeWeights)
 {
   const double node[] = {1.7, 1.1, .4, -.3, -2.};

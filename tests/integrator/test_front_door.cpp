@@ -1,4 +1,4 @@
-/* What a program may have forgotten is told before the run */
+/* Incomplete or impossible set-ups of a program are reported before the run */
 #include "support.h"
 #include <unistd.h>
 
@@ -84,7 +84,7 @@ TEST(FrontDoor, CheckpointsThatCannotBeWritten)
   }
 }
 
-/* Of less than rounding of the time, or of which 1/h^2 is no number */
+/* The run is shorter than the rounding of the time, or so short that 1/h^2 overflows */
 TEST(FrontDoor, RunsOfNoLength)
 {
   const Pendulum p(-90., 0., 1.);
@@ -108,7 +108,8 @@ TEST(FrontDoor, OneVectorForBoth)
   EXPECT_TRUE(trap.says("one vector for both")) << trap.message;
 }
 
-/* Made by SNESCreate(), without a DM and without a solution */
+/* A SNES made by the program with SNESCreate(), without a DM and without a solution vector, is used; one with a
+   function of the program is refused */
 TEST(FrontDoor, ASNESOfTheProgram)
 {
   const Pendulum p(-90., 0., 1.);

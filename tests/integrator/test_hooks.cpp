@@ -1,4 +1,5 @@
-/* What the integrator puts into a SNES goes with TSReset(), TSDestroy() and another type, and the user's comes back */
+/* What the integrator puts into a SNES (convergence test, line search, functions) is removed by TSReset(), TSDestroy()
+   and a change of type, and the user's settings are restored */
 #include "integrator/step/corrector.h"
 #include "support.h"
 #include <cstdio>
@@ -25,7 +26,7 @@ std::string lineSearchOf(SNES snes)
   return type ? type : "";
 }
 
-/* Back to the problem's initial state */
+/* Restores the initial state of the problem */
 void rewind(Simulation &run)
 {
   const Problem &p = run.problem;
@@ -58,7 +59,7 @@ const Oscillators &springs()
 
 } // namespace
 
-/* The user's program goes on with another type, with the monitors of the first */
+/* The program continues with another TS type; the monitors of hhtdae, still registered, do nothing */
 TEST(Hooks, AnotherTypeAfterSteps)
 {
   Simulation run(springs(), tolerance(1e-6) + "-ts_hhtdae_summary -ts_hhtdae_progress");
@@ -80,7 +81,8 @@ TEST(Hooks, AnotherTypeAfterSteps)
   EXPECT_GT(run.statistics().steps, 0);
 }
 
-/* The monitors of the first look into nothing that is not theirs, even if it looks like a run with a checkpoint to write */
+/* Monitors of hhtdae that are called under another TS type must not use its data, even if these look like an
+   integrator with a checkpoint to write */
 TEST(Hooks, MonitorsOfAnotherType)
 {
   const std::string checkpoint = testing::TempDir() + "hhtdae-hooks-" + std::to_string((long)getpid());
@@ -106,7 +108,7 @@ TEST(Hooks, AnotherTypeBeforeSetUp)
   EXPECT_LT(run.errors().q, 1e-3);
 }
 
-/* After differences of ours */
+/* Also after a run with Jacobians by differences */
 TEST(Hooks, AnotherTypeAfterDifferences)
 {
   Simulation run(springs(), tolerance(1e-6) + "-snes_fd_color");
@@ -118,7 +120,7 @@ TEST(Hooks, AnotherTypeAfterDifferences)
   EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
 }
 
-/* Without any Jacobian the SNES of another type makes its own, whatever was in it */
+/* Without any Jacobian the SNES of another type makes its own differences, whatever hhtdae had put into it */
 TEST(Hooks, AnotherTypeWithoutAJacobian)
 {
   for (const bool reset : {false, true})
@@ -147,7 +149,7 @@ TEST(Hooks, AnotherTypeWithoutAJacobian)
       if (options) must(TSSetFromOptions(ts));
       must(TSSolve(ts, run.U));
       EXPECT_LT(relativeDifference(run.u(), u), 1e-4) << reset << options;
-      must(TSSetType(ts, TSHHT3)); /* and back, to a SNES with a dense matrix */
+      must(TSSetType(ts, TSHHT3)); /* back to hhtdae, with a dense matrix in the SNES */
       rewind(run);
       must(TSSolve(ts, run.U));
       EXPECT_LT(relativeDifference(run.u(), u), 1e-4) << reset << options;
@@ -157,7 +159,7 @@ TEST(Hooks, AnotherTypeWithoutAJacobian)
     }
 }
 
-/* Types that were chosen go with a change of type, those that were set do not */
+/* KSP and PC types chosen by the integrator are removed with a change of type; those set by the user stay */
 TEST(Hooks, SolversOfAnotherType)
 {
   for (const bool set : {false, true}) {
@@ -178,7 +180,7 @@ TEST(Hooks, SolversOfAnotherType)
     rewind(run);
     must(run.solve());
     EXPECT_LT(relativeDifference(run.u(), u), 1e-4) << set;
-    must(TSSetType(run.ts, TSHHT3)); /* and back */
+    must(TSSetType(run.ts, TSHHT3)); /* back to hhtdae */
     rewind(run);
     must(run.solve());
     EXPECT_LT(relativeDifference(run.u(), u), 1e-4) << set;
@@ -200,7 +202,7 @@ TEST(Hooks, GoWithReset)
   EXPECT_EQ(lag, 1);
 }
 
-/* A run after TSReset() needs no step number 0 to start afresh */
+/* After TSReset() a run starts afresh even if the step number is not 0 */
 TEST(Hooks, AnotherSetUpAfterReset)
 {
   Simulation run(springs(), tolerance(1e-5));
@@ -223,10 +225,10 @@ TEST(Hooks, AnotherSetUpAfterReset)
   must(run.solve());
   EXPECT_LT(relativeDifference(run.u(), u), 1e-4);
   EXPECT_EQ(run.statistics().restarts, 1);
-  EXPECT_EQ(lineSearchOf(snes), SNESLINESEARCHSHELL); /* backtracking in between was nobody's choice */
+  EXPECT_EQ(lineSearchOf(snes), SNESLINESEARCHSHELL); /* the backtracking search that PETSc chose in between is not a choice of the user */
 }
 
-/* A SNES of the user's outlives the TS, with its own test in place */
+/* A SNES that the user has created outlives the TS, with the user's convergence test restored */
 TEST(Hooks, SharedSNESOutlivesTheTS)
 {
   SNES snes;
@@ -276,7 +278,7 @@ TEST(Hooks, SharedSNESOutlivesTheTS)
   must(MatDestroy(&J));
 }
 
-/* Two TS that step in turn with one SNES */
+/* Two TS share one SNES and make steps in turn */
 TEST(Hooks, OneSNESForTwoTS)
 {
   const Pendulum p(-90., 0., .5), q(-60., 1., .5);
@@ -288,15 +290,15 @@ TEST(Hooks, OneSNESForTwoTS)
       must(run->step());
       EXPECT_EQ(lineSearchOf(snesOf(run->ts)), SNESLINESEARCHSHELL);
     }
-  EXPECT_LT(relativeDifference(a.u(), c.u()), 1e-7); /* a matrix of its own for every step */
+  EXPECT_LT(relativeDifference(a.u(), c.u()), 1e-7); /* each step makes its own matrix */
   EXPECT_LT(relativeDifference(b.u(), d.u()), 1e-7);
-  must(TSDestroy(&a.ts)); /* resets the SNES, its matrix included: the DM makes one */
+  must(TSDestroy(&a.ts)); /* resets the SNES and its matrix; the DM then creates a new one */
   for (int k = 0; k < 20; k++)
     for (Simulation *run : {&b, &d}) must(run->step());
   EXPECT_LT(relativeDifference(b.u(), d.u()), 3e-7);
 }
 
-/* Another SNES in the middle of a run */
+/* The TS gets another SNES in the middle of a run */
 TEST(Hooks, AnotherSNESBetweenSteps)
 {
   const Pendulum p(-90., 0., .5);
@@ -315,7 +317,8 @@ TEST(Hooks, AnotherSNESBetweenSteps)
   EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-4);
 }
 
-/* Another matrix in the middle of a run, which nobody has assembled yet or whose places are those of the differences from then on */
+/* The TS gets another matrix in the middle of a run, which is not assembled yet, or whose nonzero pattern is that of
+   the differences from then on */
 TEST(Hooks, AnotherMatrixBetweenSteps)
 {
   const Pendulum p(-90., 0., .5);
@@ -355,7 +358,7 @@ TEST(Hooks, AnotherMatrixBetweenSteps)
   }
 }
 
-/* The user's test rules, its context is neither lost nor destroyed before its time */
+/* A convergence test set by the user is used, and its context is destroyed exactly once, with the SNES */
 TEST(Hooks, UsersTestStays)
 {
   static int destroyed;
@@ -378,7 +381,8 @@ TEST(Hooks, UsersTestStays)
   EXPECT_EQ(destroyed, 1);
 }
 
-/* A monitor may ask for the mass matrix in the matrices of the TS: what it leaves there is not the Newton matrix */
+/* A monitor may evaluate the Jacobian, for example the mass matrix, in the matrices of the TS; the result must not be
+   used as Newton matrix */
 TEST(Hooks, MonitorsThatEvaluateTheJacobian)
 {
   const Pendulum p(-90., 0., 1.);
@@ -407,13 +411,13 @@ TEST(Hooks, MonitorsThatEvaluateTheJacobian)
   must(through.solve());
   must(rest.solve());
   std::remove(file.c_str());
-  for (int k = 0; k < 3; k++) EXPECT_NEAR(rest.u()[k], through.u()[k], 1e-8) << k; /* pivots are chosen anew, so that last digits differ */
+  for (int k = 0; k < 3; k++) EXPECT_NEAR(rest.u()[k], through.u()[k], 1e-8) << k; /* pivots are chosen again, so that the last digits differ */
 }
 
 namespace
 {
 
-/* q'' + q^3 = 0 from 2, on a given DM */
+/* q'' + q^3 = 0 from q = 2, with a given DM */
 struct OnDM {
   TS  ts;
   Vec U, V;
@@ -462,7 +466,8 @@ void solveStatic(SNES snes, Vec x)
 
 } // namespace
 
-/* PETSc keeps the functions of a solver in its DM: the steps of two that share one have their own all the same */
+/* PETSc stores the functions of a SNES in its DM. Two solvers that share a DM nevertheless each use their own
+   functions in the steps */
 TEST(Hooks, TwoSolversOnOneDM)
 {
   DM   dm;
@@ -518,7 +523,7 @@ TEST(Hooks, TwoSolversOnOneDM)
   must(VecSet(x, 0.));
   solveStatic(snes, x);
   {
-    OnDM other(dm); /* beside one that is alive, with differences of its own */
+    OnDM other(dm); /* beside a second TS with differences of its own, which still exists */
     must(TSSetType(other.ts, TSALPHA2));
     must(TSSetTimeStep(other.ts, .01));
     other.to(.5);
@@ -532,7 +537,8 @@ TEST(Hooks, TwoSolversOnOneDM)
   must(DMDestroy(&dm));
 }
 
-/* A function around ours would add forces to the steps of which starts know nothing */
+/* A SNES function of the user that calls the integrator's is refused: it could add forces to the steps which the
+   consistent start does not contain */
 TEST(Hooks, FunctionAroundOurs)
 {
   const Pendulum p(-90., 0., 1.);
@@ -544,7 +550,7 @@ TEST(Hooks, FunctionAroundOurs)
   EXPECT_TRUE(trap.says("TSSetI2Function()")) << trap.message;
 }
 
-/* A clone shares the SNES of a TS that has read its options */
+/* A clone made before the first solve shares the SNES of a TS whose options have been read */
 TEST(Hooks, CloneBeforeTheFirstSolve)
 {
   const Pendulum p(-90., 0., .5);

@@ -1,4 +1,4 @@
-/* Linear solvers of the user's that have solved nothing, whatever they say */
+/* Linear solvers of the user that report convergence although they have not solved the system */
 #include "support.h"
 
 using namespace hhtest;
@@ -8,7 +8,7 @@ namespace
 
 PetscErrorCode nothing(PC, Vec, Vec y) { return VecZeroEntries(y); }
 
-/* The identity but for the row of the constraint */
+/* A preconditioner that is the identity except for the row of the constraint, which it sets to zero */
 PetscErrorCode withoutLast(PC, Vec x, Vec y)
 {
   must(VecCopy(x, y));
@@ -34,7 +34,8 @@ KSP solverOf(TS ts)
 
 } // namespace
 
-/* A residual below it is no solution: GMRES would make no iteration, and the predictor's values would stand */
+/* A residual below an absolute tolerance is not a criterion: GMRES would make no iteration, and the predicted values
+   would be accepted. -ksp_atol is ignored with a message */
 TEST(LinearSolves, AbsoluteTolerances)
 {
   Simulation plain(pendulum(), tolerance(1e-5));
@@ -52,13 +53,13 @@ TEST(LinearSolves, AbsoluteTolerances)
     EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-5) << atol;
     EXPECT_LT(run.statistics().steps, plain.statistics().steps * 11 / 10) << atol;
     EXPECT_EQ(out.text().find("hhtdae: -ksp_atol"), 0) << out.text();
-    EXPECT_EQ(out.text().find("has no effect"), out.text().rfind("has no effect")) << out.text(); /* said once */
+    EXPECT_EQ(out.text().find("has no effect"), out.text().rfind("has no effect")) << out.text(); /* printed once */
     must(VecDestroy(&U));
     must(VecDestroy(&V));
   }
 }
 
-/* Packages that exchange no rows, or not all, meet zeros on the diagonal of a matrix that has an inverse */
+/* Packages that do no row exchanges, or only some, meet zero pivots on the diagonal of a nonsingular matrix */
 TEST(LinearSolves, PackagesThatExchangeNoRows)
 {
   const FourBar bars(2, .4);
@@ -81,7 +82,7 @@ TEST(LinearSolves, PackagesThatExchangeNoRows)
   }
 }
 
-/* The user's is in place again for another type */
+/* The user's absolute tolerance is restored for another TS type */
 TEST(LinearSolves, AbsoluteTolerancesComeBack)
 {
   Printed    out;
@@ -96,7 +97,8 @@ TEST(LinearSolves, AbsoluteTolerancesComeBack)
   EXPECT_EQ(atol, 1e-3);
 }
 
-/* GMRES converges in the norm of its preconditioner: BoomerAMG's is blind for rows of this problem, and the run ended with an error of 500 % and no word of it */
+/* GMRES tests convergence in the preconditioned norm. BoomerAMG is singular for some rows of this problem; without a
+   check the run ended with an error of 500 % and no message */
 TEST(LinearSolves, PreconditionersOfOtherProblems)
 {
   PetscBool there;
@@ -109,7 +111,7 @@ TEST(LinearSolves, PreconditionersOfOtherProblems)
   EXPECT_TRUE(trap.says("zero or too little for the right-hand side")) << trap.message;
 }
 
-/* One without the rows of constraints */
+/* A preconditioner without the rows of constraints */
 TEST(LinearSolves, SingularPreconditioners)
 {
   for (const char *type : {"gmres", "preonly"}) {
@@ -124,7 +126,8 @@ TEST(LinearSolves, SingularPreconditioners)
   }
 }
 
-/* In the start, and where it begins on the way: a step is not accepted with the predictor's values */
+/* A preconditioner that returns zero, from the start on or from step 10 on: a step must not be accepted with the
+   predicted values */
 TEST(LinearSolves, ZeroIsNoSolution)
 {
   for (bool from_start : {true, false}) {
@@ -146,7 +149,8 @@ TEST(LinearSolves, ZeroIsNoSolution)
   }
 }
 
-/* Answers as small as rounding can tell, and smaller, are answers: a motion that dies away takes no more steps than another */
+/* Corrections as small as rounding, and smaller, are valid solutions: a motion that decays to 1e-150 takes no more
+   steps than another */
 TEST(LinearSolves, AMotionThatDiesAway)
 {
   for (const char *solver : {"", "-ksp_type gmres -pc_type jacobi"}) {
@@ -159,7 +163,8 @@ TEST(LinearSolves, AMotionThatDiesAway)
   }
 }
 
-/* A factorization or a package that the program names is taken after TSSetFromOptions(), and where that is never called, too */
+/* A factorization or package that the program sets is used, whether it is set after TSSetFromOptions() or the latter
+   is never called */
 TEST(LinearSolves, FactorsThatTheProgramNames)
 {
   for (bool options : {true, false})
@@ -192,7 +197,7 @@ TEST(LinearSolves, FactorsThatTheProgramNames)
     }
 }
 
-/* A type alone leaves the package to the integrator */
+/* If only the type of the factorization is set, the integrator chooses the package */
 TEST(LinearSolves, CholeskyOfTheProgram)
 {
   Simulation run(pendulum(), tolerance(1e-5) + "-ts_max_steps 3");

@@ -1,4 +1,5 @@
-/* The types of matrices that an application may give: the same run as with MATAIJ, or a refusal that names the type */
+/* Matrix types that an application may supply: the run is the same as with MATAIJ, or is refused with an error that
+   names the type */
 #include "matrix_types.h"
 #include "triangle.h"
 #include <cstdio>
@@ -34,7 +35,7 @@ struct ShortNet : Net {
 
 } // namespace
 
-/* Rows and columns of an operator are scaled as those of the matrix beside it */
+/* Rows and columns of an operator J are scaled like those of the assembled matrix P */
 TEST(MatrixTypes, Operators)
 {
   for (bool setRoles : {true, false}) expectOperators(ShortNet(), setRoles);
@@ -43,7 +44,7 @@ TEST(MatrixTypes, Operators)
   expectOperators(Sleigh(.2), false);
 }
 
-/* Products have no values that a checkpoint could keep: the matrix is made anew */
+/* A MATSHELL operator has no values that a checkpoint could store: the matrix is made again after resuming */
 TEST(MatrixTypes, OperatorsResume)
 {
   const ShortNet    p;
@@ -58,7 +59,7 @@ TEST(MatrixTypes, OperatorsResume)
   EXPECT_EQ(run.s.steps, reference.s.steps);
   EXPECT_EQ(run.s.corrector_fails, 0);
   EXPECT_EQ(run.other, 0);
-  EXPECT_LT(relativeDifference(run.u, reference.u), 2e-3); /* the multipliers', of which solves this rough leave so much */
+  EXPECT_LT(relativeDifference(run.u, reference.u), 2e-3); /* difference of the multipliers, which solves of this accuracy leave */
 }
 
 TEST(MatrixTypes, AssembledTypes)
@@ -75,7 +76,7 @@ TEST(MatrixTypes, AssembledTypes)
   }
 }
 
-/* PETSc's orderings of matrices of blocks are of blocks, as ours has to be */
+/* PETSc's ordering of a block matrix permutes blocks; our ordering must do so as well */
 TEST(MatrixTypes, OrderingsOfBlocks)
 {
   const ShortNet  p, free(NetRods::None);
@@ -103,7 +104,7 @@ TEST(MatrixTypes, Refusals)
     }
 }
 
-/* A matrix of another size, as one of another distribution */
+/* A matrix whose size, or parallel layout, does not fit the solution */
 TEST(MatrixTypes, OfAnotherSize)
 {
   const Pendulum p(-90., 0., 1.);
@@ -120,7 +121,7 @@ TEST(MatrixTypes, OfAnotherSize)
   must(MatDestroy(&P));
 }
 
-/* One triangle of a matrix that is not symmetric: the user's choice stands, and is said to be a poor one */
+/* Cholesky for a matrix that is not symmetric: the user's choice is kept, and a message says that it is a poor one */
 TEST(MatrixTypes, CholeskyOfAnUnsymmetricMatrix)
 {
   const UserVars  unsymmetric(1.);
@@ -134,7 +135,8 @@ TEST(MatrixTypes, CholeskyOfAnUnsymmetricMatrix)
   }
 }
 
-/* A DMShell of the application gives the matrix, as one of any other type does; one that gives none is an error that says so. x'' + 4 x = 0 */
+/* A DMShell of the application may create a matrix of any type; one that creates none leads to an error that says so.
+   x'' + 4 x = 0 */
 TEST(MatrixTypes, OfADMShell)
 {
   for (const bool gives : {true, false}) {

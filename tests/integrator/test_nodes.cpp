@@ -1,4 +1,4 @@
-/* What the preconditioner of finite elements is told: nodes, and where these are */
+/* What the preconditioner for finite elements receives: which unknowns form a node, and the positions of nodes */
 #include "linear/constraint.h"
 #include "support.h"
 
@@ -7,7 +7,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Two nodes of three unknowns, each held by springs, and one unknown that belongs to none */
+/* Two nodes of three unknowns, each held by springs, and one unknown that belongs to no node */
 class NodesTest : public testing::Test
 {
 protected:
@@ -71,7 +71,7 @@ protected:
 
 } // namespace
 
-/* Positions are those of the state that the matrix was made in: the reference and the unknowns, which hardly move here */
+/* Positions are those at the state at which the matrix was made, reference plus unknowns; here they hardly move */
 TEST_F(NodesTest, PositionsFollowTheState)
 {
   IS  is = nodes(6, 3);

@@ -1,4 +1,4 @@
-/* Setters and options: what they take, what they refuse, and that PETSc's own options win over the defaults */
+/* Setters and options: which values they accept and refuse, and that PETSc's own options take precedence over the defaults */
 #include "integrator/state.h"
 #include "support.h"
 
@@ -7,7 +7,7 @@ using namespace hhtest;
 namespace
 {
 
-/* The error of a call and its message */
+/* Expects that a call returns this error with this message */
 void expectRefused(PetscErrorCode (*call)(TS), PetscErrorCode code, const std::string &message)
 {
   const Pendulum p;
@@ -118,7 +118,7 @@ namespace
 
 PetscErrorCode freeFall(TS, PetscReal, Vec, Vec, Vec A, Vec F, void *) { return VecCopy(A, F); }
 
-/* A TS with a function, but not all that belongs to it */
+/* Sets up a TS that has a function, but not everything that belongs to it */
 PetscErrorCode setUpWith(PetscInt n, PetscInt m, std::string &message)
 {
   TS        ts;
@@ -188,7 +188,8 @@ TEST(Options, NoToleranceAtAll)
   EXPECT_TRUE(trap.says("No unknown enters the error test")) << trap.message;
 }
 
-/* What is 0 at the start enters the relative error test as soon as it is not, and is one of the entries of its mean from the start */
+/* An unknown that is 0 at the start enters the relative error test as soon as it is nonzero, and counts in the mean of
+   the norm from the start */
 TEST(Options, RelativeToleranceOfWhatIsZeroAtTheStart)
 {
   const Oscillators p({1., 2.}, {0., 0.}, false, 1.);
@@ -204,7 +205,7 @@ TEST(Options, RelativeToleranceOfWhatIsZeroAtTheStart)
   EXPECT_EQ(hht3::Get(run.ts).norm_size, 2);
 }
 
-/* The next step of orders above two is chosen by the norm that judges it */
+/* Above order two the next step is chosen with the norm in which the error is tested */
 TEST(Options, LargestErrorAboveOrderTwo)
 {
   const Chain p(30, 0., 1.);
@@ -287,7 +288,7 @@ TEST(Options, UsersLinearSolverWins)
   EXPECT_LT(relativeDifference(run.v(), plain.v()), 1e-6);
   must(TSGetSNES(plain.ts, &snes));
   must(SNESGetKSP(snes, &ksp));
-  EXPECT_EQ(typeOf(ksp), KSPPREONLY); /* the default costs one triangular solve */
+  EXPECT_EQ(typeOf(ksp), KSPPREONLY); /* a direct solver: one triangular solve per iteration */
 }
 
 TEST(Options, UsersJacobianLagWins)
@@ -300,7 +301,7 @@ TEST(Options, UsersJacobianLagWins)
   const TSHHT3Statistics a = always.statistics(), l = ladder.statistics();
   MEASURED("%d steps: %d factorizations in %d iterations with -snes_lag_jacobian 1, %d in %d with the ladder", steps,
            (int)a.factorizations, (int)a.newton, (int)l.factorizations, (int)l.newton);
-  EXPECT_GE(a.factorizations, a.newton - 10); /* every iteration but those of the start */
+  EXPECT_GE(a.factorizations, a.newton - 10); /* a factorization in every iteration except those of the start */
   EXPECT_LT(l.factorizations, l.newton / 2);
 }
 
@@ -315,10 +316,10 @@ TEST(Options, SNESMonitorsWork)
   EXPECT_TRUE(out.says("Nonlinear solve converged"));
 }
 
-/* A line search of the user's in place of ours gives the same answer */
+/* A line search of the user replaces ours and gives the same result */
 TEST(Options, UsersLineSearchWins)
 {
-  /* every line search of PETSc evaluates the residual after the last correction, too, which ours leaves out */
+  /* all line searches of PETSc evaluate the residual after the last correction, which ours omits */
   const Pendulum p(-60., 1., .5);
   Simulation     plain(p, tolerance(1e-6));
   must(plain.solve());
@@ -337,7 +338,8 @@ TEST(Options, UsersLineSearchWins)
   }
 }
 
-/* Where nothing is left to be corrected PETSc's line searches and trust regions end as they like, without a test of convergence */
+/* If no correction is needed, PETSc's line searches and trust regions end in their own ways without calling the
+   convergence test; these must not count as failures */
 TEST(Options, OtherSearchesAtEquilibrium)
 {
   const Pendulum hanging(0., 0., 2.);
@@ -350,7 +352,8 @@ TEST(Options, OtherSearchesAtEquilibrium)
   }
 }
 
-/* PETSc's own Krylov method, in the place of a single product with what is no inverse */
+/* If the user chooses a preconditioner that is not a direct solver, PETSc's default Krylov method is used, not a
+   single application of the preconditioner */
 TEST(Options, APreconditionerHasAKrylovMethod)
 {
   for (const auto &[type, method] : {std::make_pair("jacobi", KSPGMRES), std::make_pair("lu", KSPPREONLY), std::make_pair("svd", KSPPREONLY)}) {
@@ -367,7 +370,8 @@ TEST(Options, APreconditionerHasAKrylovMethod)
   }
 }
 
-/* One solve a step needs the matrix of that step: two masses with a stiff spring between them */
+/* With TS_LINEAR there is one linear solve per step, which needs a matrix of that very step: two masses with a stiff
+   spring between them */
 TEST(Options, OneSolveOfALinearProblem)
 {
   struct Coupled : Problem {
@@ -395,7 +399,7 @@ TEST(Options, OneSolveOfALinearProblem)
   must(one.solve());
   must(many.solve());
   EXPECT_LE(one.statistics().steps, 1.1 * many.statistics().steps);
-  EXPECT_NEAR(one.u()[0] - one.u()[1], many.u()[0] - many.u()[1], 1e-8); /* the spring's force, 1e6 times that */
+  EXPECT_NEAR(one.u()[0] - one.u()[1], many.u()[0] - many.u()[1], 1e-8); /* relative to the spring's force this is 1e6 times as much */
 }
 
 TEST(Options, SummaryLine)
@@ -426,7 +430,7 @@ TEST(Options, ResetAndRunAgain)
   must(TSGetSNES(run.ts, &snes));
   must(SNESGetJacobian(snes, &J, &P, nullptr, nullptr));
   must(PetscObjectReference((PetscObject)J));
-  must(TSReset(run.ts)); /* PETSc forgets the matrix, but not the function that fills it */
+  must(TSReset(run.ts)); /* PETSc drops the matrix but not the function that fills it */
   must(SNESSetJacobian(snes, J, J, nullptr, nullptr));
   must(MatDestroy(&J));
   Array u0(p.n), v0(p.n);
@@ -446,7 +450,8 @@ TEST(Options, ResetAndRunAgain)
   EXPECT_LT(relativeDifference(run.u(), u), 1e-5);
 }
 
-/* The operator without a matrix, preconditioned by the assembled one; without any matrix there is no consistent start */
+/* A matrix-free operator, preconditioned by the assembled matrix; without any assembled matrix no consistent start is
+   possible */
 TEST(Options, MatrixFreeOperators)
 {
   const Pendulum p(-90., 0., 2.);
@@ -462,7 +467,7 @@ TEST(Options, MatrixFreeOperators)
   EXPECT_TRUE(trap.says("-snes_mf_operator")) << trap.message;
 }
 
-/* A SNES of one linear solve counts its iterations by itself */
+/* A SNES of type ksponly, one linear solve per step, counts its iterations correctly */
 TEST(Options, OneLinearSolvePerStep)
 {
   const Oscillators p({1., 3.}, {0., .1}, true, 2.);
@@ -488,7 +493,7 @@ TEST(Options, AlphaOfARadius)
   EXPECT_DOUBLE_EQ(after, before);
 }
 
-/* as TSSetFromOptions() between two TSSolve() does */
+/* Setting the same values after the set-up is allowed, since TSSetFromOptions() between two TSSolve() does this */
 TEST(Options, TheSameValuesAfterTheSetUp)
 {
   const Pendulum p;

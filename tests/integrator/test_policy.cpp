@@ -1,4 +1,4 @@
-/* The corrector's decisions, on numbers: when an iteration ends, and when a matrix is due */
+/* The corrector's decisions as pure functions of numbers: when an iteration ends, and when a new matrix is due */
 #include "integrator/step/policy.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,8 @@ using namespace hht3;
 namespace
 {
 
-/* What is left when a linear iteration of rate xi, of which the first correction is e, is ended by the test, and after how many */
+/* The error left when a linear iteration of rate xi, whose first correction is e, is ended by the test, and the number
+   of corrections */
 struct End {
   double left;
   int    corrections;
@@ -35,7 +36,7 @@ End iterate(double xi, double e, double tol, double known)
 
 } // namespace
 
-/* (40): whatever the rate, what is left is below the tolerance, and not far below it */
+/* (40): whatever the rate, the remaining error is below the tolerance, but not far below it */
 TEST(Policy, ErrorLeftIsBelowTheTolerance)
 {
   for (double xi : {1e-3, .05, .2, .3})
@@ -50,14 +51,14 @@ TEST(Policy, ErrorLeftIsBelowTheTolerance)
     }
 }
 
-/* A known rate saves the second correction where it may be believed, and never below `remembered` */
+/* A rate known from earlier iterations saves the second correction; it is taken as at least 0.3 */
 TEST(Policy, KnownRates)
 {
   EXPECT_EQ(iterate(1e-3, 1e-3, 1e-3, -1.).corrections, 2);
   EXPECT_EQ(iterate(1e-3, 1e-3, 1e-3, 1e-3).corrections, 1);
-  EXPECT_EQ(iterate(1e-3, 2.2e-3, 1e-3, 1e-3).corrections, 1); /* 0.3/0.7 of it */
+  EXPECT_EQ(iterate(1e-3, 2.2e-3, 1e-3, 1e-3).corrections, 1); /* the limit is 0.3/0.7 of the tolerance */
   EXPECT_EQ(iterate(1e-3, 2.5e-3, 1e-3, 1e-3).corrections, 2);
-  EXPECT_EQ(iterate(.5, 1e-4, 1e-3, -1.).corrections, 1); /* so small that no rate matters */
+  EXPECT_EQ(iterate(.5, 1e-4, 1e-3, -1.).corrections, 1); /* so small that it is accepted with any rate */
 }
 
 TEST(Policy, WhatCannotConverge)
@@ -65,14 +66,15 @@ TEST(Policy, WhatCannotConverge)
   const double tol = 1e-3;
   EXPECT_EQ(JudgeCorrections({2., 1., 2, 8}, -1., tol, 0.), Verdict::Stalled);
   EXPECT_EQ(JudgeCorrections({1., 1., 2, 8}, -1., tol, 0.), Verdict::Stalled);
-  EXPECT_EQ(JudgeCorrections({.9, 1., 2, 8}, -1., tol, 0.), Verdict::Stalled); /* 0.9^8 is not 1e-4 */
+  EXPECT_EQ(JudgeCorrections({.9, 1., 2, 8}, -1., tol, 0.), Verdict::Stalled); /* 0.9^8 is larger than 1e-4 */
   EXPECT_EQ(JudgeCorrections({.2, 1., 2, 8}, -1., tol, 0.), Verdict::GoOn);
   EXPECT_EQ(JudgeCorrections({.2, 1., 2, 0}, -1., tol, 0.), Verdict::Stalled);
   EXPECT_EQ(JudgeCorrections({1., 0., 1, 0}, -1., tol, 0.), Verdict::TooMany);
-  EXPECT_EQ(JudgeCorrections({1., .5, 5, 3}, -1., tol, 1.), Verdict::Converged); /* rounding of q */
+  EXPECT_EQ(JudgeCorrections({1., .5, 5, 3}, -1., tol, 1.), Verdict::Converged); /* corrections of the size of rounding */
 }
 
-/* What a Krylov method leaves of the first correction may be larger than the correction in positions: the third one tells */
+/* The error of a Krylov solve in the first correction may exceed the correction of the positions; the rate is known
+   only from the third correction */
 TEST(Policy, RoughSolves)
 {
   EXPECT_EQ(JudgeCorrections({2., 1., 2, 8, true}, -1., 1e-3, 0.), Verdict::GoOn);
@@ -81,7 +83,7 @@ TEST(Policy, RoughSolves)
   EXPECT_EQ(JudgeCorrections({1e-6, 1., 2, 8, true}, -1., 1e-3, 0.), Verdict::Converged);
 }
 
-/* While h is about the matrix' own and corrections converge, there is one matrix */
+/* One matrix is used as long as h stays near that of the matrix and corrections converge */
 TEST(Policy, MatrixServesManySteps)
 {
   const ReuseOptions o;
@@ -92,7 +94,7 @@ TEST(Policy, MatrixServesManySteps)
   for (double h : {1., 1.39, 1. / 1.39}) EXPECT_FALSE(m.due(h, o)) << h;
   for (double h : {1.41, 1. / 1.41}) EXPECT_TRUE(m.due(h, o)) << h;
   m.fresh = PETSC_FALSE;
-  m.learn(true, false, .3, o); /* slow */
+  m.learn(true, false, .3, o); /* too slow */
   EXPECT_TRUE(m.due(1., o));
   m.made(1.);
   m.learn(true, false, .1, o);
@@ -101,7 +103,8 @@ TEST(Policy, MatrixServesManySteps)
   EXPECT_TRUE(m.due(1., o));
 }
 
-/* Where a matrix costs no factorization a slower rate than by default is not worth its corrections, unless the user says so */
+/* With a matrix that needs no factorization the limit of the rate is lower: a new matrix costs less than additional
+   corrections, unless the user has set the limit */
 TEST(Policy, RateWithoutFactor)
 {
   ReuseOptions o;
@@ -112,14 +115,14 @@ TEST(Policy, RateWithoutFactor)
   EXPECT_EQ(o.of(true).slow_rate, o.slow_rate);
 }
 
-/* Old matrices that fail again and again are tried less and less often, and as before once one has held */
+/* If old matrices fail repeatedly, they are tried less and less often; after one success the policy is as before */
 TEST(Policy, ReuseBacksOff)
 {
   const ReuseOptions o;
   MatrixPolicy       m;
   int                steps[8] = {};
   for (int failure = 0; failure < 8; failure++) {
-    m.made(1.); /* the retry */
+    m.made(1.); /* the correction is repeated with a new matrix */
     m.learn(true, true, .1, o);
     while (m.due(1., o)) {
       steps[failure]++;
@@ -127,11 +130,11 @@ TEST(Policy, ReuseBacksOff)
       m.made(1.);
       m.learn(true, false, .1, o);
     }
-    m.fresh = PETSC_FALSE; /* an old one is tried, and fails: once more */
+    m.fresh = PETSC_FALSE; /* an old matrix is tried again, and fails */
   }
   const int expected[8] = {1, 2, 4, 8, 16, 32, 32, 32};
   for (int k = 0; k < 8; k++) EXPECT_EQ(steps[k], expected[k]) << k;
-  m.learn(true, false, .1, o); /* it holds */
+  m.learn(true, false, .1, o); /* the old matrix succeeds */
   m.made(1.);
   m.learn(true, true, .1, o);
   EXPECT_EQ(m.renew_steps, 1);

@@ -42,7 +42,7 @@ using Dense = std::vector<Array>;
 
 Array residual(const Problem &p, double t, const State &s)
 {
-  Array f(p.n, std::nan("")); /* a row that is not written shows */
+  Array f(p.n, std::nan("")); /* an entry that the residual does not write becomes visible */
   p.residual(t, s.u.data(), s.v.data(), s.a.data(), f.data());
   return f;
 }
@@ -62,7 +62,7 @@ Dense dense(const Problem &p, double t, const State &s, double sv, double sa)
   return D;
 }
 
-/* dF/dx_j by the four-point formula, x one of the state's three arrays */
+/* dF/dx_j by the four-point formula, where x is one of the three arrays of the state */
 Array differenceColumn(const Problem &p, double t, State s, Array State::*x, PetscInt j)
 {
   const double h = 1e-4 * std::max(1., std::abs((s.*x)[j])), x0 = (s.*x)[j];
@@ -76,7 +76,7 @@ Array differenceColumn(const Problem &p, double t, State s, Array State::*x, Pet
   return d;
 }
 
-/* A random state around the initial one: coordinates stay near it, so that lengths stay away from zero */
+/* A random state near the initial one, so that lengths do not come near zero */
 State randomState(const Problem &p, std::mt19937 &generator)
 {
   std::uniform_real_distribution<double> uniform(-1., 1.);
@@ -95,7 +95,7 @@ bool isConstraint(const Problem &p, PetscInt i)
   return p.role[i] == TSHHT3_HOLONOMIC || p.role[i] == TSHHT3_NONHOLONOMIC;
 }
 
-/* Size of the terms in every row, for tolerances: forces may cancel in the residual itself */
+/* Size of the terms in every row, as a scale for tolerances, because forces may cancel in the residual */
 Array rowScale(const Problem &p, double t, const State &s)
 {
   const Dense K = dense(p, t, s, 0., 0.), KC = dense(p, t, s, 1., 0.), KM = dense(p, t, s, 0., 1.);
@@ -265,7 +265,7 @@ TEST_P(ProblemTest, ReferenceStartsAtTheInitialState)
   }
 }
 
-/* References are computed in long double. Where that is not more than double, as under valgrind, they have not the digits. */
+/* References are computed in long double. Where long double is no more than double, as under valgrind, they lack the digits */
 bool extended()
 {
   volatile const long double one = 1.L, small = std::ldexp(1.L, -60);
@@ -304,7 +304,7 @@ TEST_P(ProblemTest, ReferenceSolvesTheEquations)
   EXPECT_GT(checked, 0);
 }
 
-/* Velocities and accelerations of a reference are the derivatives of its positions and velocities */
+/* Velocities and accelerations of a reference are the derivatives of its positions */
 TEST_P(ProblemTest, ReferenceMovesAsItSays)
 {
   if (!extended()) GTEST_SKIP() << noLongDouble;
@@ -328,7 +328,7 @@ TEST_P(ProblemTest, ReferenceMovesAsItSays)
   }
 }
 
-/* The adaptor to PETSc gives the same residual and matrix as the problem itself, on any number of ranks */
+/* The adaptor to PETSc gives the residual and matrix of the problem, on any number of ranks */
 TEST_P(ProblemTest, TimeStepperEvaluatesTheProblem)
 {
   const Problem &p = *problem;
@@ -358,7 +358,7 @@ TEST_P(ProblemTest, TimeStepperEvaluatesTheProblem)
   ASSERT_EQ(MatDuplicate(J, MAT_DO_NOT_COPY_VALUES, &copy), 0);
   const Array f = residual(p, t, s);
   const Dense D = dense(p, t, s, sv, sa);
-  for (Mat m : {J, copy}) { /* into a duplicate, too */
+  for (Mat m : {J, copy}) { /* also into a duplicate */
     ASSERT_EQ(TSComputeI2Jacobian(ts, t, U, V, A, sv, sa, m, m), 0);
     ASSERT_EQ(MatMult(m, X, Y), 0);
     const double *fa, *ya;
@@ -448,7 +448,7 @@ TEST(ProblemReport, ErrorsAreRelativeToTheReference)
   EXPECT_NEAR(errors.q, 1e-3 / std::max(1., std::abs(r.u[2])), 1e-12);
   EXPECT_NEAR(errors.v, 1e-5 / std::max(1., std::abs(r.v[4])), 1e-12);
   EXPECT_NEAR(errors.lambda, 1e-2 / lambdaMax, 1e-12);
-  EXPECT_LT(errors.other, 0.); /* nothing of that kind */
+  EXPECT_LT(errors.other, 0.); /* the problem has no unknowns of that kind */
   ASSERT_EQ(VecDestroy(&U), 0);
   ASSERT_EQ(VecDestroy(&V), 0);
   ASSERT_EQ(TSDestroy(&ts), 0);
@@ -529,7 +529,7 @@ TEST(ProblemDigits, HeavyTop)
   }
 }
 
-/* The digits that the headers claim for their own references: halve the step */
+/* Verifies the accuracy that the headers claim for their references: change of the reference when its step is halved */
 template <class P, class... Args> double changeByHalving(double t, double step, Args... args)
 {
   P      coarse(args..., t, step), fine(args..., t, step / 2.);

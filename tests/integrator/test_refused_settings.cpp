@@ -1,4 +1,4 @@
-/* Settings that cannot work end in a message that says why, never in a crash or in a state that is not a number */
+/* Settings that cannot work lead to an error message that gives the reason, never to a crash or to NaN in the state */
 #include "support.h"
 
 using namespace hhtest;
@@ -21,10 +21,10 @@ void expectRefused(const Refusal &r)
     Simulation run(p, tolerance(1e-5) + r.options);
     code = run.solve();
   } catch (const std::runtime_error &) {
-    code = PETSC_ERR_ARG_WRONG; /* when options were read */
+    code = PETSC_ERR_ARG_WRONG; /* raised while options are read */
   }
   EXPECT_NE(code, 0) << r.options;
-  EXPECT_TRUE(trap.says(r.says) || trap.says("less than allowed bound") || trap.says("greater than allowed bound")) << r.options << ": " << trap.message; /* PETSc's own words since 3.21 */
+  EXPECT_TRUE(trap.says(r.says) || trap.says("less than allowed bound") || trap.says("greater than allowed bound")) << r.options << ": " << trap.message; /* PETSc's own message since 3.21 */
 }
 
 } // namespace
@@ -81,7 +81,7 @@ TEST(RefusedSettings, TypesOfSNES)
 namespace
 {
 
-/* Right, or a message */
+/* Either the result is right, or there is an error message */
 void tryTypeOfSNES(const std::string &type)
 {
   const Pendulum p(-90., 0., .1);
@@ -103,20 +103,21 @@ void tryTypeOfSNES(const std::string &type)
       EXPECT_EQ(code, 0) << type << ": " << trap.message;
     }
   } catch (const std::runtime_error &) {
-    EXPECT_FALSE(trap.message.empty()) << type; /* when options were read */
+    EXPECT_FALSE(trap.message.empty()) << type; /* raised while options are read */
   }
 }
 
 } // namespace
 
-/* Every type that PETSc has */
+/* Every SNES type of PETSc */
 TEST(RefusedSettings, EveryTypeOfSNES)
 {
   for (const char *type : {"newtonls", "newtontr", "newtontrdc", "ksponly", "nrichardson", "ngmres", "anderson", "qn", "ncg", "ngs", "ms", "fas", "nasm", "aspin", "composite", "multiblock", "shell"})
     tryTypeOfSNES(type);
 }
 
-/* Trust regions and line searches end where norms of residuals are rounding: no reason for a smaller step. This four-bar passes its flat positions */
+/* Trust regions and line searches may fail where residual norms are rounding errors; this is no reason to reduce h.
+   The four-bar here passes through its flat positions */
 TEST(RefusedSettings, NormsThatAreRounding)
 {
   const FourBar p(2, 10.);
@@ -130,7 +131,8 @@ TEST(RefusedSettings, NormsThatAreRounding)
   }
 }
 
-/* By itself, since it loses its DM, and with it the communicator, where there are no cells to make patches of: looked for leaks without it */
+/* Tested separately, because SNESPATCH leaks its DM and communicator where there are no cells to build patches from;
+   skipped when leaks are checked */
 TEST(RefusedSettings, SNESOfTypePatch)
 {
 #if defined(__SANITIZE_ADDRESS__)
@@ -154,7 +156,7 @@ struct Broken : Pendulum {
 
 } // namespace
 
-/* Types of SNES that look at no norm */
+/* SNES types that do not test norms */
 TEST(RefusedSettings, NotANumberIsNotAccepted)
 {
   const Broken p;
@@ -184,7 +186,7 @@ TEST(RefusedSettings, SolversThatDoNotFit)
   }
 }
 
-/* They ended in multipliers off by percents, or in steps without end */
+/* Linear solves that depend on earlier ones; these options had led to multipliers wrong by percents or to an endless run */
 TEST(RefusedSettings, SolvesThatGoOnFromOthers)
 {
   expectRefused({"-ksp_type gmres -pc_type none -snes_ksp_ew", "-snes_ksp_ew"});
@@ -193,7 +195,7 @@ TEST(RefusedSettings, SolvesThatGoOnFromOthers)
   expectRefused({"-ksp_type gmres -ksp_diagonal_scale -ksp_diagonal_scale_fix", "-ksp_diagonal_scale"});
 }
 
-/* PETSc's options for differences */
+/* PETSc's options for Jacobians by differences */
 TEST(RefusedSettings, JacobiansFromDifferences)
 {
   const Pendulum p(-90., 0., .5);
@@ -206,7 +208,7 @@ TEST(RefusedSettings, JacobiansFromDifferences)
              (int)plain.statistics().newton);
     EXPECT_LT(relativeDifference(run.u(), plain.u()), 1e-5) << option;
     EXPECT_LT(run.statistics().newton, plain.statistics().newton * 11 / 10 + 5) << option;
-    EXPECT_GE(run.statistics().residuals, plain.statistics().residuals + 3 * run.statistics().jacobians) << option; /* so there were differences */
+    EXPECT_GE(run.statistics().residuals, plain.statistics().residuals + 3 * run.statistics().jacobians) << option; /* differences were used */
   }
 }
 
@@ -215,7 +217,7 @@ TEST(RefusedSettings, FinalTimeByInterpolation)
   const Pendulum p(-90., 0., .5);
   Simulation     run(p, tolerance(1e-6) + "-ts_exact_final_time interpolate");
   ErrorTrap      trap;
-  /* TSSolve(ts, NULL), which older versions of PETSc cannot interpolate into */
+  /* TSSolve(ts, NULL): older versions of PETSc cannot interpolate into the solution */
 #if PETSC_VERSION_LT(3, 20, 0)
   EXPECT_EQ(run.solve(), PETSC_ERR_ARG_NULL);
   EXPECT_TRUE(trap.says("TSSolve(ts, U)")) << trap.message;
@@ -227,10 +229,10 @@ TEST(RefusedSettings, FinalTimeByInterpolation)
 #endif
 }
 
-/* Coarse matrices that are not made of the scaled one ended in a segmentation fault */
+/* Multigrid whose coarse matrices are not formed from the scaled matrix; this had ended in a segmentation fault */
 TEST(RefusedSettings, MultigridWithMatricesOfTheApplication) { expectRefused({"-ksp_type gmres -pc_type mg -pc_mg_levels 2", "coarse levels"}); }
 
-/* They belong to the unknowns one by one */
+/* Vectors of tolerances must have one entry per unknown */
 TEST(RefusedSettings, VectorsOfTolerancesOfAnotherLayout)
 {
   const Pendulum p(-90., 0., .1);

@@ -1,4 +1,4 @@
-/* Roles of unknowns: detected equal set ones for every example, refused where they make no sense */
+/* Roles of unknowns: the detected roles equal the set ones for every example, and impossible roles are refused */
 #include "integrator/state.h"
 #include "support.h"
 
@@ -44,7 +44,7 @@ void setIS(TS ts, TSHHT3Role role, std::vector<PetscInt> index)
 
 } // namespace
 
-/* A force state and a variable differ in what they mean to the application only: both are detected as variables */
+/* A force state and a variable differ only in their meaning for the application: both are detected as variables */
 TEST(Roles, DetectedEqualSetOnes)
 {
   for (const Factory &f : allProblems()) {
@@ -63,7 +63,7 @@ TEST(Roles, DetectedEqualSetOnes)
   }
 }
 
-/* Set or detected, the run is the same to the last bit */
+/* With detected roles a run is the same to the last bit as with set ones */
 TEST(Roles, DetectionDoesNotChangeTheRun)
 {
   const UserVars p(.3);
@@ -72,7 +72,7 @@ TEST(Roles, DetectionDoesNotChangeTheRun)
   must(set.solve());
   EXPECT_EQ(detected.u(), set.u());
   EXPECT_EQ(detected.v(), set.v());
-  EXPECT_EQ(detected.statistics().jacobians, set.statistics().jacobians); /* probes are not part of the run */
+  EXPECT_EQ(detected.statistics().jacobians, set.statistics().jacobians); /* evaluations for the detection are not counted */
 }
 
 TEST(Roles, ViewSaysWhatIsLeftOut)
@@ -94,7 +94,7 @@ TEST(Roles, ViewSaysWhatIsLeftOut)
   EXPECT_NE(w.find("left out: velocity-level constraints"), std::string::npos) << w;
 }
 
-/* A plain second-order ODE has neither roles to look up nor scalings */
+/* A plain second-order ODE allocates neither roles nor scalings */
 TEST(Roles, AnODECarriesNoRoleMachinery)
 {
   const Oscillators p({1., 3.}, {0., 0.}, true, 1.);
@@ -109,7 +109,8 @@ TEST(Roles, AnODECarriesNoRoleMachinery)
   EXPECT_EQ(I.constraints(), 0);
 }
 
-/* The row that has inertia, or a rate, is that of the unknown that is named wrongly */
+/* An unknown named with a wrong role is refused if its row contains inertia (a second derivative) or a rate (a first
+   derivative) */
 TEST(Roles, NamedAgainstTheirRows)
 {
   struct Two : Problem {
@@ -146,7 +147,8 @@ TEST(Roles, NamedAgainstTheirRows)
     }
 }
 
-/* A velocity-level row that is named holonomic would be scaled by 1/(beta h^2), and its multiplier be wrong without a word */
+/* A constraint row that depends on velocities or accelerations but is named holonomic would be scaled by 1/(beta h^2),
+   and its multiplier would be wrong without any message */
 TEST(Roles, RowsThatAreNotWhatTheyAreNamed)
 {
   struct Differentiated : Pendulum {
@@ -173,7 +175,7 @@ TEST(Roles, RowsThatAreNotWhatTheyAreNamed)
   }
 }
 
-/* Sums that threads make in another order every time are no dependence */
+/* Residuals whose last digits vary from call to call, as sums by several threads do, do not show a dependence */
 TEST(Roles, ResidualsThatRoundDifferentlyAreNoOtherRoles)
 {
   struct Noisy : Pendulum {
@@ -189,7 +191,7 @@ TEST(Roles, ResidualsThatRoundDifferentlyAreNoOtherRoles)
   must(TSSetUp(run.ts));
 }
 
-/* Beside a first-order state, whose part in constraints is looked for with detected roles, too. s' = -s */
+/* The same with detected roles and beside a first-order state, whose influence on constraints is tested as well; s' = -s */
 TEST(Roles, ResidualsThatRoundDifferentlyNeedNoNamedRoles)
 {
   struct Noisy : Pendulum {
@@ -267,7 +269,7 @@ TEST(Roles, AfterSetUpIsRefused)
   must(ISDestroy(&is));
 }
 
-/* An unknown whose inertia stands in another row breaks the rule that row i belongs to unknown i */
+/* An unknown whose inertia is in another row violates the rule that row i is the equation of unknown i */
 TEST(Roles, RowsInTheWrongOrderAreNamed)
 {
   struct Swapped : Pendulum {
@@ -311,7 +313,7 @@ TEST(Roles, EmptyRowIsNamed)
   EXPECT_TRUE(trap.says("Row 2 of the residual depends on no unknown")) << trap.message;
 }
 
-/* Who names constraints alone may ask for the coordinates, after TSReset() as well */
+/* If only constraints are named, the coordinates are the remaining unknowns, also after TSReset() */
 TEST(Roles, CoordinatesAreThoseThatNobodyNames)
 {
   const Pendulum p;
@@ -332,7 +334,7 @@ TEST(Roles, CoordinatesAreThoseThatNobodyNames)
   }
 }
 
-/* A set is taken back: without any the roles are detected */
+/* After all index sets are removed the roles are detected */
 TEST(Roles, SetsTakenBack)
 {
   const Pendulum p(-90., 0., .1);

@@ -1,4 +1,4 @@
-/* Rotation vectors of orders above two, against formulas of Rodrigues and a tangent by series of matrices */
+/* Rotation vectors for orders above two, against Rodrigues' formula and the series of the tangent operator */
 #include "integrator/coordinates/rotation_vector.h"
 #include "support.h"
 #include <array>
@@ -85,7 +85,7 @@ TEST(RotationVector, Stumpff)
   }
 }
 
-/* x - base = T(x)^{-1} g for rotations up to what a step makes, and beyond */
+/* Solves x - base = T(x)^{-1} g, for rotations as large as those of a step and larger */
 TEST(RotationVector, Implicit)
 {
   Random random;

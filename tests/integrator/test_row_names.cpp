@@ -1,4 +1,4 @@
-/* What the application calls its rows stands in messages that tell of one */
+/* The application's names of rows appear in messages about these rows */
 #include "support.h"
 
 using namespace hhtest;
@@ -12,7 +12,7 @@ PetscErrorCode nameOf(TS, PetscInt row, char name[], size_t len, void *)
   return row < 2 ? PetscStrncpy(name, names[row], len) : (PetscErrorCode)0;
 }
 
-/* Parts of a pendulum's equations are no numbers from a time on */
+/* A pendulum with rows that are NaN from some time on */
 struct Torn : Pendulum {
   double from;
   bool   matrix;
@@ -70,7 +70,7 @@ TEST(RowNames, OfInitialValues)
   EXPECT_TRUE(trap.says("of unknown 0 (x of the bob) is not a number")) << trap.message;
 }
 
-/* A row of the constraints has no name here: its number alone */
+/* The constraint's row has no name here, and the message gives its number */
 TEST(RowNames, OfViolatedConstraints)
 {
   const Pendulum p(-60., 1., 1.);

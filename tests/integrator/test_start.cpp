@@ -12,7 +12,7 @@ struct StartValues {
   Array u, a;
 };
 
-/* What the integrator started from, by dense output at the begin of the first step */
+/* The values from which the first step started, by dense output at its beginning */
 StartValues startValues(const Problem &p, const std::string &options)
 {
   Simulation run(p, options);
@@ -27,7 +27,7 @@ StartValues startValues(const Problem &p, const std::string &options)
   return s;
 }
 
-/* A pendulum with start values of any kind */
+/* A pendulum with arbitrary initial values */
 struct Displaced : Pendulum {
   Array q, v;
   Displaced(Array position, Array velocity) : Pendulum(-90., 0., 1.), q(std::move(position)), v(std::move(velocity)) {}
@@ -52,7 +52,7 @@ struct Driven : Problem {
     t1   = 1.;
     role = {TSHHT3_COORDINATE, TSHHT3_HOLONOMIC};
   }
-  double motion(double t) const { return t < 0. ? NAN : 1. - std::cos(w * t); } /* s'' = w^2 at once */
+  double motion(double t) const { return t < 0. ? NAN : 1. - std::cos(w * t); } /* s'' = w^2 immediately after t_0 */
   void   initial(double *u, double *v) const override { u[0] = u[1] = v[0] = v[1] = 0.; }
   void   residual(double t, const double *u, const double *, const double *a, double *f) const override
   {
@@ -67,7 +67,7 @@ struct Driven : Problem {
   }
 };
 
-/* The pendulum with its rod given twice */
+/* A pendulum whose constraint appears twice */
 struct Redundant : Pendulum {
   Redundant()
   {
@@ -100,7 +100,7 @@ struct Redundant : Pendulum {
   bool reference(double, double *, double *, double *) const override { return false; }
 };
 
-/* A mass of 1 kg in a damper that moves at its speed, m q'' + c (q' - v) = m: q'' = 1 however strong the damper */
+/* A mass of 1 kg in a damper that moves along with it, m q'' + c (q' - v) = m: q'' = 1 however strong the damper */
 struct Dragged : Problem {
   const double c;
   explicit Dragged(double damping) : c(damping)
@@ -127,7 +127,7 @@ struct Dragged : Problem {
 
 /* A mass of 2 kg whose velocity is a state: 2 q'' + lambda = 0, s' + 3 s = 0, q' - s = 0 */
 struct Followed : Problem {
-  const double given; /* s' as the application says */
+  const double given; /* the initial s' given by the application */
   explicit Followed(double rate) : given(rate)
   {
     name = "followed";
@@ -214,7 +214,7 @@ TEST(Start, CarAxisAccelerations)
   EXPECT_LT(dl, 1e-9);
 }
 
-/* A motion that begins at t_0 must not be looked at before */
+/* A motion that begins at t_0 must not be evaluated before t_0 */
 TEST(Start, MotionThatBeginsAtTheStart)
 {
   for (double w : {.1, 1., 30., 1000.}) {
@@ -225,7 +225,7 @@ TEST(Start, MotionThatBeginsAtTheStart)
   }
 }
 
-/* A constraint follows a state with the rate that the state has, whatever was given for it */
+/* The velocity constraint q' = s is differentiated with the rate s' = -3 s of the state, whatever initial s' was given */
 TEST(Start, ConstraintsFollowStates)
 {
   for (double given : {0., -3., 5.}) {
@@ -236,7 +236,7 @@ TEST(Start, ConstraintsFollowStates)
   }
 }
 
-/* The matrix of the start holds inertia alone */
+/* The matrix of the start contains only inertia, so that strong damping has no influence */
 TEST(Start, StrongDampingIsNoInertia)
 {
   for (double damping : {1e4, 1e9, 1e12, 1e15}) {
@@ -275,7 +275,7 @@ TEST(Start, ProjectionMovesAPerturbedPendulumBack)
   const std::string o = tolerance(1e-6) + "-ts_hhtdae_start project";
   const StartValues s = startValues(p, o);
   EXPECT_NEAR(radius(s.u), 1., 1e-12);
-  /* the mass matrix is a multiple of the unit matrix: the nearest point lies on the same ray */
+  /* since the mass matrix is a multiple of the unit matrix, the nearest point lies on the same ray */
   EXPECT_NEAR(s.u[0] / s.u[1], 1.02 / -.01, 1e-2 * 102.);
   EXPECT_NEAR(s.u[0], 1.02 / std::hypot(1.02, .01), 1e-4);
   Simulation run(p, o);
@@ -286,7 +286,7 @@ TEST(Start, ProjectionMovesAPerturbedPendulumBack)
   const Array v = whole(V);
   must(VecDestroy(&V));
   EXPECT_NEAR(v[0] * s.u[0] + v[1] * s.u[1], 0., 1e-10);
-  /* only what points along the rod has been taken away */
+  /* only the velocity component along the rod has been removed */
   EXPECT_NEAR(-v[0] * s.u[1] + v[1] * s.u[0], -.3 * s.u[1] + .5 * s.u[0], 1e-9);
   must(run.solve());
   EXPECT_NEAR(radius(run.u()), 1., 1e-8);
@@ -314,7 +314,7 @@ TEST(Start, MisfitIsReported)
     EXPECT_EQ(out.text(), "");
   }
   {
-    Printed out; /* below the tolerance it is nobody's business */
+    Printed out; /* below the tolerance nothing is reported */
     startValues(Displaced({1. + 1e-5, 0.}, {0., 0.}), tolerance(1e-3));
     EXPECT_EQ(out.text(), "");
   }
@@ -395,7 +395,7 @@ TEST(Start, TrapezoidalRuleWithConstraintsWarns)
   EXPECT_EQ(out.text(), "");
 }
 
-/* Without -ts_dt the first step is one that the error test accepts and does not find far too small */
+/* Without -ts_dt the first step is chosen such that the error test accepts it and the second step is of similar length */
 TEST(Start, FirstStepIsChosen)
 {
   for (double eps : {1e-4, 1e-8}) {
@@ -421,7 +421,8 @@ TEST(Start, FirstStepIsChosen)
 namespace
 {
 
-/* A mass on two springs in series, between which a damper acts from 0.3 s on: only then the rate of the place between them stands in an equation */
+/* A mass on two springs in series with a damper at the point between them that acts from 0.3 s on; before, the rate of
+   this point occurs in no equation */
 struct LateDamper : Problem {
   static constexpr double k = 500., soft = 10., c = 40., g = 9.81, on = 0.3;
 
@@ -450,7 +451,7 @@ struct LateDamper : Problem {
     J.add(1, 0, -k);
     J.add(1, 1, sv * damper(t) + soft + k);
   }
-  /* In closed form until the damper acts, from there by many steps of the classical method of Runge and Kutta; good to 9 digits */
+  /* In closed form until the damper acts, afterwards by many steps of the classical Runge-Kutta method; good to 9 digits */
   double exact() const
   {
     const double          w = std::sqrt(k * soft / (k + soft)), mid = -g / (w * w), amplitude = 0.5 - mid, q = mid + amplitude * std::cos(w * on);
@@ -472,7 +473,7 @@ struct LateDamper : Problem {
 
 } // namespace
 
-/* It had rounding over 1e-28 for its rate */
+/* The rate of such a point at the start must not be computed from rounding errors (it had been rounding divided by 1e-28) */
 TEST(Start, RatesThatMeanNothingAtFirst)
 {
   const LateDamper p;
@@ -488,7 +489,7 @@ TEST(Start, RatesThatMeanNothingAtFirst)
 namespace
 {
 
-/* x = sin 3 t is prescribed, of which nothing is known beyond the end of the run */
+/* x = sin 3 t is prescribed and defined only up to the end of the run */
 struct Tabulated : Problem {
   explicit Tabulated(double begin)
   {
@@ -513,13 +514,13 @@ struct Tabulated : Problem {
 
 } // namespace
 
-/* Constraints that are no numbers ahead are differenced backwards */
+/* Where constraints are NaN at later times they are differentiated by backward differences */
 TEST(Start, WhereATableEnds)
 {
   for (double left : {1e-2, 1e-3, 1e-4, 1e-5, 1e-6}) {
     const Tabulated p(1. - left);
     const double    exact = -9. * std::sin(3. * p.t0), a = startValues(p, tolerance(1e-5)).a[0];
     MEASURED("%g before the end: acceleration off by %.1e of %.1f", left, std::abs(a - exact), exact);
-    EXPECT_NEAR(a, exact, 1e-2) << left; /* with the lag of the first step */
+    EXPECT_NEAR(a, exact, 1e-2) << left; /* contains the lag of the first step */
   }
 }

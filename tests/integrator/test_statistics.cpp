@@ -1,4 +1,4 @@
-/* The counters, and by them the reuse of the matrix */
+/* The counters of a run, and the reuse of the matrix as the counters show it */
 #include "support.h"
 #include <chrono>
 #include <thread>
@@ -8,7 +8,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Counts what the integrator asks for */
+/* Counts the calls of the integrator */
 struct Counting : Pendulum {
   mutable int residuals = 0, jacobians = 0;
   explicit Counting(double end, double speed = 0.) : Pendulum(-90., speed, end) {}
@@ -32,7 +32,7 @@ TEST(Statistics, CountEverythingTheProblemIsAskedFor)
   const Counting p(2.);
   Simulation     run(p, tolerance(1e-6));
   must(TSSetUp(run.ts));
-  const int residuals = p.residuals, jacobians = p.jacobians; /* of detecting the roles */
+  const int residuals = p.residuals, jacobians = p.jacobians; /* calls made for the detection of the roles */
   must(run.solve());
   const TSHHT3Statistics s = run.statistics();
   EXPECT_EQ(s.residuals, p.residuals - residuals);
@@ -50,7 +50,8 @@ TEST(Statistics, CountEverythingTheProblemIsAskedFor)
   EXPECT_EQ(s.tiny_steps, 0);
 }
 
-/* The rates of a start take the factors of its accelerations, from rest the matrix, too; so does the misfit of its velocities */
+/* The rates at the start use the factorization for the accelerations; from rest they use its matrix as well, and so
+   does the residual of the velocity constraints */
 TEST(Statistics, FactorizationsOfAStart)
 {
   PetscLogEvent      event;
@@ -65,7 +66,7 @@ TEST(Statistics, FactorizationsOfAStart)
     must(run.step());
     must(PetscLogEventGetPerfInfo(PETSC_DETERMINE, event, &after));
     const TSHHT3Statistics s = run.statistics();
-    EXPECT_EQ(s.factorizations, 2) << speed; /* of the start and of the first step */
+    EXPECT_EQ(s.factorizations, 2) << speed; /* one of the start, one of the first step */
     EXPECT_EQ(after.count - before.count, 2) << speed;
     EXPECT_EQ(s.jacobians, speed ? 3 : 2) << speed;
   }
@@ -99,7 +100,7 @@ TEST(Statistics, Times)
   EXPECT_LT(run.statistics().cpu, 60.);
 }
 
-/* After each step, and without what lies between two solves */
+/* Time of steps is counted without the time between two solves */
 TEST(Statistics, TimesOfStepsAlone)
 {
   const Pendulum p(-90., 0., .1);
@@ -119,7 +120,7 @@ TEST(Statistics, TimesOfStepsAlone)
   EXPECT_LT(run.statistics().time, 1e-3 * (double)pause.count());
 }
 
-/* A linear problem at one h needs one matrix, beside those of the start */
+/* A linear problem at constant h needs one matrix besides those of the start */
 TEST(Statistics, OneFactorizationForALinearProblemAtOneStepSize)
 {
   const Oscillators p({1., 5., 20.}, {0., .1, .02}, true, 10.);
@@ -161,7 +162,7 @@ TEST(Statistics, FewFactorizationsForMechanisms)
   }
 }
 
-/* -ts_hhtdae_reuse 1,0,1 makes a new matrix in every step, and the answer does not depend on it */
+/* -ts_hhtdae_reuse 1,0,1 makes a new matrix in every step; the result is the same */
 TEST(Statistics, ReuseCanBeSwitchedOff)
 {
   const UserVars p(1.);

@@ -1,4 +1,5 @@
-/* Sweeps over vectors: both versions of a loop, entries that do not fill a group of four, nothing written beyond the end. */
+/* Vectorized loops over vectors: both versions give the same result, also for lengths that are not multiples of four,
+   and write nothing beyond the end */
 #include "integrator/sweeps.h"
 #include "support.h"
 #include <cmath>
@@ -72,7 +73,7 @@ TEST(Sweeps, BothVersionsGiveTheSameDigits)
 }
 #endif
 
-/* What the corrector sees of a multiplier is 0 times its correction: it must not hide what is not a number */
+/* A multiplier enters the corrector's norm as 0 times its correction; a NaN in it must nevertheless be noticed */
 TEST(Sweeps, NoNumberStaysNoNumber)
 {
   const std::vector<PetscScalar> x(6, 0);

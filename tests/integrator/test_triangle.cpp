@@ -1,4 +1,4 @@
-/* An application whose Jacobian holds one triangle, MATSBAIJ: the same run as with all of it, or a refusal that says why */
+/* Jacobians that store one triangle (MATSBAIJ): the run is the same as with the full matrix, or is refused with a reason */
 #include "triangle.h"
 
 using namespace hhtest;
@@ -46,7 +46,7 @@ TEST(Triangle, SameRunAsWithAllOfTheMatrix)
     }
 }
 
-/* PETSc's own LDL^T does not pivot: it serves where there are no multipliers */
+/* PETSc's LDL^T does not pivot: it can be used where there are no multipliers */
 TEST(Triangle, TheUsersSolverHolds)
 {
   const std::string cholesky = std::string(tight) + "-pc_type cholesky -pc_factor_mat_solver_type petsc ", package = std::string(tight) + "-pc_factor_mat_solver_type ";
@@ -63,7 +63,7 @@ TEST(Triangle, TheUsersSolverHolds)
   EXPECT_NE(said.find("-pc_type cholesky"), std::string::npos) << said;
 }
 
-/* Columns by differences fill both triangles */
+/* Differences fill whole columns, that is both triangles, and are refused */
 TEST(Triangle, DifferencesAreRefused)
 {
   TS   ts;
@@ -98,7 +98,7 @@ TEST(Triangle, RedundantRowsAreNamed)
   EXPECT_NE(said.find("rows 34, 35 depend on one another"), std::string::npos) << said;
 }
 
-/* Set by the application, and detected where the triangle shows them */
+/* Roles that make the matrix unsymmetric are refused, whether set by the application or detected from the triangle */
 TEST(Triangle, RolesThatBreakTheSymmetryAreNamed)
 {
   const UserVars vars(1.);
@@ -114,7 +114,7 @@ TEST(Triangle, RolesThatBreakTheSymmetryAreNamed)
   }
 }
 
-/* Where the TS gets another SNES in the course of a run the matrix of that one holds one triangle */
+/* If the TS gets another SNES during a run, the matrix of that SNES stores one triangle */
 TEST(Triangle, AnotherSNESBetweenSteps)
 {
   const Sleigh p(1.);

@@ -1,4 +1,5 @@
-/* Starts in other units of length and in runs that have no end: nothing depends on what 1 is, or on how long a run may be */
+/* Starts in other units of length and time and in runs of any length: results depend neither on the unit nor on the
+   length of the run */
 #include "support.h"
 
 using namespace hhtest;
@@ -6,7 +7,8 @@ using namespace hhtest;
 namespace
 {
 
-/* A mass of 2 on a rod of length L at its lowest point, with a speed: m q'' + Phi_q^T lambda = Q with Phi = |q| - L */
+/* A mass of 2 on a rod of length L in its lowest position, with a horizontal velocity: m q'' + Phi_q^T lambda = Q with
+   Phi = |q| - L */
 struct AtItsLowest : Problem {
   const double L, speed, g;
   AtItsLowest(double unit, double length, double v) : L(length * unit), speed(v * unit), g(9.81 * unit)
@@ -36,7 +38,7 @@ struct AtItsLowest : Problem {
       for (int j = 0; j < 2; j++) J.add(i, j, (i == j ? 2. * sa + u[2] / r : 0.) - u[2] * u[i] * u[j] / (r * r * r));
     for (int i = 0; i < 2; i++) J.add(i, 2, u[i] / r), J.add(2, i, u[i] / r);
   }
-  /* the rod's force by what it is */
+  /* the computed force of the rod over the exact one */
   double ratio(double lambda) const { return lambda / (2. * (g + speed * speed / L)); }
 };
 
@@ -54,7 +56,8 @@ double startRatio(const AtItsLowest &p)
 
 } // namespace
 
-/* Its horizontal coordinate is 0, which says nothing of lengths. A time too short for anything to change gives no differences, which is no derivative of zero. */
+/* The horizontal coordinate is 0 and gives no scale of lengths. Over a time too short for anything to change,
+   differences of the constraint vanish, which must not be taken for a zero derivative */
 TEST(Units, ForcesOfTheStart)
 {
   for (double length : {.5, 5., 20.})
@@ -67,7 +70,7 @@ TEST(Units, ForcesOfTheStart)
 namespace
 {
 
-/* A mass of 3 that follows sin(2 (t - begin) + 0.7) */
+/* A mass of 3 whose position is prescribed as sin(2 (t - begin) + 0.7) */
 struct Late : Problem {
   const double begin;
   explicit Late(double t) : begin(t)
@@ -99,7 +102,7 @@ struct Late : Problem {
 
 } // namespace
 
-/* Seconds since 1970, of which rounding leaves a quarter of a microsecond: forces as at any other time */
+/* Times like seconds since 1970, whose rounding is a quarter of a microsecond: forces are as accurate as near t = 0 */
 TEST(Units, LateInTime)
 {
   for (const char *order : {"2", "auto"}) {
@@ -132,7 +135,8 @@ TEST(Units, LateInTime)
   }
 }
 
-/* From rest the run's length is the only time that is known at first. Runs that something else is to end are as those that end. */
+/* From rest, the length of the run is at first the only known time scale; it must not influence the steps. A run to
+   1e300 is a run that something other than the final time ends */
 TEST(Units, LongRuns)
 {
   const Pendulum p(-60., 0., 2.);
@@ -151,7 +155,7 @@ TEST(Units, LongRuns)
   }
 }
 
-/* m q'' + lambda = 0, q = 1 - cos(w t) from rest: what a run without end finds out of how fast that is */
+/* m q'' + lambda = 0, q = 1 - cos(w t) from rest: how well a very long run finds the time scale of the motion */
 struct Swung : Problem {
   const double w;
   explicit Swung(double frequency) : w(frequency)

@@ -1,4 +1,5 @@
-/* What the user sets in TS, TSAdapt and SNES rules: option by option, with the effect that it must have, or the word that it has none */
+/* The user's settings of TS, TSAdapt and SNES are respected: each option has the effect that it must have, or is
+   reported to have none */
 #include "integrator/state.h"
 #include "support.h"
 
@@ -43,7 +44,7 @@ Outcome runWith(const std::string &options)
 int attempts(const Outcome &o) { return (int)(o.s.steps + o.s.rejected + o.s.corrector_fails + o.s.retries); }
 
 struct Row {
-  std::string                                               with, without; /* beside what both have */
+  std::string                                               with, without; /* in addition to the options that both runs have */
   std::function<bool(const Outcome &with, const Outcome &without)> effect;
 };
 
@@ -130,7 +131,7 @@ TEST(UserSettings, TolerancesSetByTheProgramAreReportedToo)
   must(SNESSetTolerances(snes, 1e-50, 1e-12, 1e-8, 30, 10000));
   must(run.solve());
   EXPECT_TRUE(out.says("SNESSetTolerances() has no effect")) << out.text();
-  EXPECT_EQ(hht3::Get(run.ts).corrector.max_it, 30); /* but of the number of iterations */
+  EXPECT_EQ(hht3::Get(run.ts).corrector.max_it, 30); /* only the number of iterations changes */
 }
 
 TEST(UserSettings, NumberOfIterations)
@@ -145,7 +146,7 @@ TEST(UserSettings, NumberOfIterations)
   EXPECT_EQ(hht3::Get(plain.ts).corrector.max_it, 10);
 }
 
-/* ---- types of TSAdapt that are not PETSc's, or not made for this ---- */
+/* ---- types of TSAdapt that are not part of PETSc, or not made for this integrator ---- */
 
 namespace
 {

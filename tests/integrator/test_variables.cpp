@@ -1,4 +1,5 @@
-/* Variables and states in constraints: which are taken, and that accelerations and multipliers know how they change */
+/* Variables and states in constraints: which dependences are accepted, and that accelerations and multipliers take the
+   change of the variables into account */
 #include "support.h"
 
 #include <cmath>
@@ -11,7 +12,7 @@ namespace
 double speed(double t) { return .3 * std::sin(3. * t); }
 double rate(double t) { return .9 * std::cos(3. * t); }
 
-/* Who knows the speed of the cart */
+/* how the constraint gets the velocity of the cart */
 enum class Speed { Time,
                    Variable,
                    Chain,
@@ -21,7 +22,7 @@ enum class Speed { Time,
                    OfVelocity,
                    OfMultiplier };
 
-/* A cart of mass 2 whose speed is given by a velocity-level constraint, and a free one beside it; lambda = -2 x'' */
+/* A cart of mass 2 whose velocity is given by a velocity-level constraint, and a free cart beside it; lambda = -2 x'' */
 struct Cart : Problem {
   Speed how;
 
@@ -133,7 +134,8 @@ std::string refusal(const Problem &p)
 
 } // namespace
 
-/* At the start, in the first step and at times between steps the multiplier is that of a speed which the row has itself */
+/* At the start, in the first step and at times between steps the multiplier is the same as if the constraint contained
+   the velocity as a function of time */
 TEST(Variables, InConstraintsOfVelocities)
 {
   for (Speed how : {Speed::Time, Speed::Variable, Speed::Chain, Speed::State, Speed::OfPosition}) {
@@ -158,12 +160,13 @@ TEST(Variables, InConstraintsOfVelocities)
     }
     must(VecDestroy(&U));
     MEASURED("kind %d: multiplier at %d samples within steps to %.1e", (int)how, samples, worst);
-    EXPECT_LT(worst, how == Speed::State ? 2e-4 : 1e-7) << "kind " << (int)how; /* rates of states are interpolated there */
+    EXPECT_LT(worst, how == Speed::State ? 2e-4 : 1e-7) << "kind " << (int)how; /* rates of states are interpolated at such times */
     EXPECT_GT(samples, 10);
   }
 }
 
-/* What depends on velocities or multipliers changes with the accelerations that are looked for */
+/* Variables that depend on velocities or multipliers would make the differentiated constraint depend on the unknown
+   accelerations; they are refused in constraints */
 TEST(Variables, OfVelocitiesOrMultipliersInConstraintsAreRefused)
 {
   EXPECT_NE(refusal(Cart(Speed::OfVelocity)).find("row 4 depends on a variable or force state that itself depends on velocities"), std::string::npos);
