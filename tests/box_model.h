@@ -1,5 +1,4 @@
-/* A box of 8-node bricks as a finite-element model, assembled in parallel: for tests and benchmarks of the reduction.
- */
+/* A box of 8-node bricks as a finite-element model, assembled in parallel, for tests and benchmarks of the reduction */
 #ifndef HHTDAE_TESTS_BOX_MODEL_H
 #define HHTDAE_TESTS_BOX_MODEL_H
 
@@ -21,7 +20,7 @@ struct Box {
   int                                n[3];
   double                             size[3];
   Material                           material = {2.1e11, 0.3, 7850};
-  std::function<bool(int, int, int)> present  = [](int, int, int) { return true; }; /* which bricks there are */
+  std::function<bool(int, int, int)> present  = [](int, int, int) { return true; }; /* whether brick (i, j, k) exists */
   std::function<Vector3(Vector3)>    map      = [](Vector3 x) { return x; };        /* position of nodes */
 };
 
@@ -33,7 +32,8 @@ inline void boxMust(PetscErrorCode code)
 constexpr int brick_corner[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                     {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 
-/* K (24 x 24) and m_ij (8 x 8) of one brick, 2 x 2 x 2 points; in loops, because 16 sources compile it */
+/* K (24 x 24) and m_ij (8 x 8) of one brick by 2 x 2 x 2 integration points; written as loops to keep compilation
+   short, since 16 sources include this header */
 inline void brickMatrices(const double X[8][3], const Material &m, double K[24][24], double M[8][8])
 {
   const double lame  = m.young * m.poisson / ((1 + m.poisson) * (1 - 2 * m.poisson)),
@@ -84,7 +84,7 @@ public:
     addSet("left", [](const Vector3 &x) { return x[0] < 1e-9; });
     addSet("right", [this](const Vector3 &x) { return x[0] > box_.size[0] * (1 - 1e-9); });
   }
-  /* by positions in the undistorted grid */
+  /* selects nodes by their positions in the undistorted grid */
   void addSet(const std::string &name, const std::function<bool(const Vector3 &)> &inside)
   {
     std::vector<PetscInt> &set = model_.sets[name];
@@ -96,8 +96,8 @@ public:
 private:
   const Box             box_;
   FeModel              &model_;
-  std::vector<PetscInt> node_;  /* of grid points, -1: not used */
-  std::vector<PetscInt> point_; /* of nodes */
+  std::vector<PetscInt> node_;  /* node of each grid point; -1: not used */
+  std::vector<PetscInt> point_; /* grid point of each node */
 
   int     at(int i, int j, int k) const { return (i * (box_.n[1] + 1) + j) * (box_.n[2] + 1) + k; }
   Vector3 grid(PetscInt p) const
@@ -154,7 +154,7 @@ private:
     boxMust(MatSetOption(A, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
     return A;
   }
-  /* An element is on the rank of its first node, which then adds to rows of others */
+  /* An element belongs to the rank of its first node, which also adds entries to rows of other ranks */
   void assemble()
   {
     model_.K         = matrix(81);

@@ -1,11 +1,12 @@
-/* Dense linear algebra that results are compared with, by LAPACK and compiled once: each of Eigen's solvers takes seconds in every source that names it. */
+/* Dense linear algebra for references of tests, by LAPACK and compiled once: each of Eigen's solvers would take
+   seconds in every source that uses it */
 #pragma once
 #include <Eigen/Core>
 
 namespace hhtest
 {
 
-/* K x = l M x with symmetric matrices, M positive definite: l in ascending order, and x with x^T M x = 1 as columns */
+/* K x = l M x with symmetric K and M, M positive definite: l in ascending order, columns x with x^T M x = 1 */
 struct DenseModes {
   Eigen::VectorXd values;
   Eigen::MatrixXd vectors;
@@ -14,12 +15,12 @@ DenseModes      ModesOf(const Eigen::MatrixXd &K, const Eigen::MatrixXd &M);
 Eigen::VectorXd EigenvaluesOf(const Eigen::MatrixXd &K, const Eigen::MatrixXd &M);
 Eigen::VectorXd EigenvaluesOf(const Eigen::MatrixXd &symmetric);
 
-/* A x = b for each column of b; LeastSquares() where A has more rows than columns */
+/* A x = b for each column of b; LeastSquares() if A has more rows than columns */
 Eigen::MatrixXd  SolveDense(const Eigen::MatrixXd &A, const Eigen::MatrixXd &b);
 Eigen::MatrixXcd SolveComplex(const Eigen::MatrixXcd &A, const Eigen::MatrixXcd &b);
 Eigen::MatrixXd  LeastSquares(const Eigen::MatrixXd &A, const Eigen::MatrixXd &b);
 
-/* Singular values above threshold times the largest */
+/* Number of singular values above threshold times the largest */
 int RankOf(const Eigen::MatrixXcd &A, double threshold);
 
 } // namespace hhtest

@@ -1,4 +1,4 @@
-/* Euler angles in a run of a scene that has not said so. */
+/* Selects Euler angles in a run of a scene without the option for it */
 #ifndef HHTDAE_TESTS_EULER_RUN_H
 #define HHTDAE_TESTS_EULER_RUN_H
 
@@ -7,7 +7,7 @@
 namespace hhtest
 {
 
-/* Before the run has begun */
+/* To be called before the first step */
 inline PetscErrorCode UseEulerAngles(hhtdae::Runtime &R)
 {
   PetscFunctionBegin;

@@ -51,7 +51,7 @@ inline Lattice middle(const Lattice &a, const Lattice &b)
   return {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
 }
 
-/* Corners, then middles of edges; corners stand at even places of the lattice */
+/* Corner nodes, then middle nodes of edges; corners have even lattice coordinates */
 template <class Shape> void addCell(const std::vector<Lattice> &corners, bool other, std::vector<BoxCell> &cells)
 {
   BoxCell cell{corners, other};
@@ -80,7 +80,7 @@ template <class Shape> std::vector<BoxCell> cellsOf(const MeshBox &box)
           continue;
         }
         const int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
-        for (int t = 0; t < 6; t++) { /* along the axes in every order */
+        for (int t = 0; t < 6; t++) { /* one for each order of the three axes */
           std::vector<Lattice> c{o};
           for (int s = 0; s < 3; s++) {
             Lattice step{0, 0, 0};
@@ -94,7 +94,7 @@ template <class Shape> std::vector<BoxCell> cellsOf(const MeshBox &box)
   return cells;
 }
 
-/* Faces of cells whose corners all have x at the given place, with middle nodes */
+/* Faces, with middle nodes, of the cells whose corners all have this x */
 template <class Shape> std::vector<std::vector<Lattice>> facesAt(const std::vector<BoxCell> &cells, int x)
 {
   std::vector<std::vector<Lattice>> faces;
@@ -130,7 +130,7 @@ public:
     static const int volume[] = {4, 11, 5, 17}, surface[] = {2, 9, 3, 16};
     volume_ = volume[(int)box.type], surface_ = surface[(int)box.type];
   }
-  /* Numbers of nodes have gaps */
+  /* The numbering of nodes has gaps */
   long tag(const Lattice &l) const { return 1 + l[0] + (2L * box_.nx + 1) * (l[1] + (2L * box_.ny + 1) * l[2]); }
 
   std::string text(bool four) const { return header(four) + nodes(four) + elements(four); }
@@ -166,7 +166,7 @@ private:
     return four ? hhtest::text("%.17g %.17g %.17g\n", x[0], x[1], x[2])
                 : hhtest::text("%ld %.17g %.17g %.17g\n", t, x[0], x[1], x[2]);
   }
-  /* in two blocks, and a node that no element has */
+  /* in two blocks, with one node that belongs to no element */
   std::string nodes(bool four) const
   {
     const long  unused = 1000000;
@@ -212,7 +212,7 @@ private:
   }
 };
 
-/* A file of the first rank's, seen by all, which goes when the object does */
+/* A file written by the first rank and visible to all ranks, removed by the destructor */
 class MeshFile
 {
 public:
@@ -261,7 +261,7 @@ inline PetscErrorCode readBox(FeModel &model, const MeshBox &box, const Material
   return readText(model, MeshWriter(box).text(four), materials);
 }
 
-/* A field of displacements at own nodes */
+/* A field of displacements at the nodes of this rank */
 template <class F> Vec fieldOf(const FeModel &model, F &&f)
 {
   Vec          u;

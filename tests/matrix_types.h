@@ -1,4 +1,4 @@
-/* Runs whose Jacobian is of a type other than MATAIJ, or whose operator is a shell beside an assembled matrix */
+/* Runs whose Jacobian has a type other than MATAIJ, or whose operator is a MATSHELL beside an assembled matrix */
 #ifndef HHTDAE_TESTS_MATRIX_TYPES_H
 #define HHTDAE_TESTS_MATRIX_TYPES_H
 
@@ -7,21 +7,21 @@
 namespace hhtest
 {
 
-/* The application's matrices: P of a type and block size; J the same one, or an operator of its own */
+/* The application's matrices: P has a type and a block size; J is P or a separate operator */
 struct Matrices {
   MatType  type  = MATAIJ;
   PetscInt block = 1;
-  enum { Same, Shell, Managed, Second } J = Same; /* Shell: with PETSc's scalings; Managed: a shell that keeps its own; Second: another assembled matrix */
-  bool assembles = true;                            /* the application assembles its operator, as PETSc's examples do */
+  enum { Same, Shell, Managed, Second } J = Same; /* Shell: PETSc applies the scalings; Managed: a shell that applies them itself; Second: another assembled matrix */
+  bool assembles = true;                            /* the application assembles its operator, like PETSc's examples */
 };
 
-/* What the operator multiplies with: a copy of P as the application made it */
+/* Data of the operator: a copy of P as the application computed it */
 struct OperatorData {
   TSI2Jacobian f;
   void        *ctx;
   Mat          J = nullptr, values = nullptr;
   bool         assembles;
-  int          other = 0; /* calls with another operator than ours */
+  int          other = 0; /* number of calls with an operator other than the application's */
 
   static PetscErrorCode product(Mat J, Vec x, Vec y)
   {
@@ -47,7 +47,7 @@ struct OperatorData {
   }
 };
 
-/* A run with these matrices, which TSSetFromOptions() sees */
+/* A run with these matrices, which exist before TSSetFromOptions() */
 struct MatrixRun {
   Array            u;
   TSHHT3Statistics s = {};

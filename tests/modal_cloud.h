@@ -1,4 +1,4 @@
-/* A flexible body made of point masses, with modes of its own: everything about it can be summed up particle by particle. */
+/* A flexible body made of point masses with given modes: every inertia quantity can be computed as a sum over particles */
 #ifndef HHTDAE_TESTS_MODAL_CLOUD_H
 #define HHTDAE_TESTS_MODAL_CLOUD_H
 
@@ -12,11 +12,11 @@ namespace hhtest
 
 struct ModalCloud {
   std::vector<double>          mass;
-  std::vector<hhtdae::Vector3> X;     /* from the centre of mass */
-  Eigen::MatrixXd              shape; /* 3 rows per particle x modes */
+  std::vector<hhtdae::Vector3> X;     /* positions from the centre of mass */
+  Eigen::MatrixXd              shape; /* 3 rows per particle, one column per mode */
   hhtdae::ModalBody            body;
 
-  /* free: modes neither move the centre of mass nor turn the body, as those of an unsupported one */
+  /* free: modes neither move the centre of mass nor turn the body, like the modes of an unsupported body */
   ModalCloud(int particles, int modes, unsigned seed, bool free = true)
   {
     std::mt19937                           random(seed);
@@ -46,8 +46,8 @@ struct ModalCloud {
     for (auto &a : body.attachments)
       for (auto &B : a.stiffening) symmetric(B);
   }
-  /* Every particle p is a kept node with the label 10 + 3 p, those of odd p with a rotation; load cases "dead", forces on all particles that stay in body axes,
-     and "follows", with gradients at random */
+  /* Every particle p is a kept node with the label 10 + 3 p, those with odd p have rotations; load case "dead": forces
+     on all particles that are fixed in body axes; load case "follows": with random gradients */
   static hhtdae::Vector3 deadForce(std::size_t p) { return {0.3 + (double)p, -1., 0.2 * (double)p}; }
   void                   keepNodes(unsigned seed)
   {

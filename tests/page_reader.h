@@ -1,4 +1,5 @@
-/* A page of a run read back, by the layout that src/scene/output/page_frames.h and page_surface.h tell; shares no code with what writes it. */
+/* Reads the page of a run according to the layout described in src/scene/output/page_frames.h and page_surface.h;
+   shares no code with the writer */
 #ifndef HHTDAE_TESTS_PAGE_READER_H
 #define HHTDAE_TESTS_PAGE_READER_H
 
@@ -41,7 +42,7 @@ inline std::string inflated(const std::string &packed)
   }
 }
 
-/* Reads what stands one after the other */
+/* Reads values one after the other */
 class PageInput
 {
 public:
@@ -99,25 +100,25 @@ struct PageSurface {
   }
 };
 
-/* A surface whose nodes move by themselves */
+/* A surface whose nodes have independent motions (whole finite-element body) */
 struct PageMotion {
   std::size_t nodes;
   bool        stress;
 };
 
-/* Frames of all blocks */
+/* A page with the frames of all blocks */
 struct PageFile {
-  std::string                      text, scene; /* JSON */
+  std::string                      text, scene; /* the JSON parts */
   std::vector<PageSurface>         surface;
   std::vector<double>              time;
-  std::vector<std::vector<double>> track, step; /* frame by frame; step: of its codes */
+  std::vector<std::vector<double>> track, step; /* frame by frame; step: the resolution of the codes */
   std::vector<std::vector<float>>  channel;     /* frame by frame */
-  std::vector<std::vector<double>> stress;      /* frame by frame, of the surfaces with stress in turn */
+  std::vector<std::vector<double>> stress;      /* frame by frame, for each surface with stress in turn */
   std::vector<std::vector<double>> moved;       /* frame by frame, x, y, z of the nodes of all PageMotions */
-  std::vector<double>              moved_step;  /* frame by frame, the largest of them */
+  std::vector<double>              moved_step;  /* frame by frame, the largest resolution */
   int                              blocks = 0;
 
-  /* tracks: 7 per body, and modes; nodes: of the surfaces with modes and stress */
+  /* tracks: 7 per body, plus modes; nodes: numbers of nodes of the surfaces with modes and stress */
   PageFile(const std::string &page, std::size_t tracks, std::size_t channels, const std::vector<std::size_t> &nodes = {}, const std::vector<PageMotion> &motion = {})
       : text(page)
   {

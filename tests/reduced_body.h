@@ -1,5 +1,5 @@
-/* A reduced body made by hand for tests of its file, stress and pictures: smooth numbers, so that every entry tells its
- * place. */
+/* A reduced body made by hand for tests of its file, stress and pictures; its numbers are smooth functions of the
+   indices, so that a misplaced entry is noticed */
 #ifndef HHTDAE_TESTS_REDUCED_BODY_H
 #define HHTDAE_TESTS_REDUCED_BODY_H
 
@@ -25,7 +25,7 @@ inline Eigen::MatrixXd Numbers(Eigen::Index rows, Eigen::Index cols, double seed
       rows, cols, [seed](Eigen::Index i, Eigen::Index j) { return Number(seed, (double)i, (double)j); });
 }
 
-/* A row of bricks with 8 nodes along x, and one of tetrahedra with 4 in its last; stress at two of three nodes */
+/* A row of 8-node bricks along x, the last of which is divided into 4-node tetrahedra; stress at two of three nodes */
 struct HandMade {
   ReducedBody body;
   PetscInt    bricks, nodes;
@@ -79,7 +79,7 @@ private:
       a.rotation    = Numbers(3, n, 40 + (double)a.name.size());
       m.attachments.push_back(a);
     }
-    for (int k = 0; k < 3; k++) { /* the last one without rotation */
+    for (int k = 0; k < 3; k++) { /* the last one has no rotation */
       ModalNode a;
       a.label       = 1000 + 9 * k;
       a.position    = Numbers(3, 1, 80 + k);
@@ -127,7 +127,7 @@ private:
   }
 };
 
-/* A name for a file that goes away with it; the same on all ranks if they ask for it in the same order */
+/* A file name that is removed by the destructor; all ranks get the same name if they ask for names in the same order */
 class Scratch
 {
 public:
@@ -193,7 +193,7 @@ inline bool SameMatrix(const Eigen::MatrixXd &a, const Eigen::MatrixXd &b)
   return a.rows() == b.rows() && a.cols() == b.cols() && a == b;
 }
 
-/* To the last bit, with the same distribution but for the elements, which are compared by their number */
+/* Equality to the last bit, with the same distribution; the distribution of elements may differ, they are compared by number */
 inline bool Same(const ReducedBody &a, const ReducedBody &b)
 {
   bool same = Same(a.modal, b.modal) && a.source == b.source && a.method == b.method && a.units == b.units &&

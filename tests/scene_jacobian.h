@@ -1,4 +1,4 @@
-/* A scene in any state: its residual, and its Jacobian against differences of the residual. */
+/* A scene in an arbitrary state: its residual, and its Jacobian compared with differences of the residual */
 #ifndef HHTDAE_TESTS_SCENE_JACOBIAN_H
 #define HHTDAE_TESTS_SCENE_JACOBIAN_H
 
@@ -53,15 +53,15 @@ public:
     return whole(F);
   }
   double get(Vec x, PetscInt i) const { return whole(x)[i]; }
-  /* what the definition of a variable says in this state */
+  /* the value that a variable's definition gives in this state */
   double definition(hhtdae::Variable v)
   {
     const PetscInt row = R.number.variable[v.id];
     return get(U, row) - residual()[row];
   }
-  /* local rotation vectors count from here: du/dt = u' and du'/dt = u'' */
+  /* makes the present attitudes the reference of the local rotation vectors, so that du/dt = u' and du'/dt = u'' */
   void refer() { must(hhtdae::RenewAxes(R, U, V)); }
-  /* along the motion, from the reference: du = u' d + u'' d^2/2, du' = u'' d */
+  /* moves along the motion from the reference: du = u' d + u'' d^2/2, du' = u'' d */
   void advance(double d)
   {
     must(VecAXPY(U, d, V));
@@ -70,7 +70,7 @@ public:
     t += d;
   }
 
-  /* u of the body whose rotation coordinate c is turns by w0 x e_c times this */
+  /* changes u of the body with the rotation coordinate c by w0 x e_c times `by` */
   void turn(PetscInt c, double by)
   {
     if (by == 0) return;
@@ -82,8 +82,8 @@ public:
       add(U, first + (k + 2) % 3, -by * w0((k + 1) % 3));
     }
   }
-  /* largest difference between the Jacobian F_u + sv F_u' + sa F_u'' and differences, relative to the entry or to one. factor:
-     TSHHT3GetRotationFactor(), du of a rotation vector is (1 - factor sv [w0]) du, with any w0 */
+  /* Largest difference between the Jacobian F_u + sv F_u' + sa F_u'' and differences, relative to max(1, entry).
+     factor: TSHHT3GetRotationFactor(); du of a rotation vector is (1 - factor sv [w0]) du, with an arbitrary w0 */
   double jacobianError(double sv, double sa, double factor = 0)
   {
     const double d     = 1e-6;

@@ -1,4 +1,4 @@
-/* What the tests of a scene's results share: files that vanish, tables read back, swinging rods. */
+/* Shared by the tests of a scene's results: temporary files, tables read back, swinging rods */
 #ifndef HHTDAE_TESTS_SCENE_OUTPUT_H
 #define HHTDAE_TESTS_SCENE_OUTPUT_H
 
@@ -13,7 +13,7 @@ namespace hhtest
 
 using namespace hhtdae;
 
-/* A file name of this process's own; the files are removed at the end */
+/* A unique file name; the files are removed by the destructor */
 class TemporaryFile
 {
 public:
@@ -68,7 +68,7 @@ struct CSV {
   }
 };
 
-/* TS of a scene, set up from options */
+/* The TS of a scene, set up from options */
 class SceneRun
 {
 public:

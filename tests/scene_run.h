@@ -1,4 +1,4 @@
-/* A run of a scene without a TS. */
+/* A run of a scene without a TS */
 #ifndef HHTDAE_TESTS_SCENE_RUN_H
 #define HHTDAE_TESTS_SCENE_RUN_H
 
@@ -8,7 +8,7 @@
 namespace hhtest
 {
 
-/* The scene has been set up */
+/* The scene must have been set up */
 inline std::unique_ptr<hhtdae::Runtime> layOut(const hhtdae::Scene &s)
 {
   auto R = std::make_unique<hhtdae::Runtime>(hhtdae::SceneAccess::model(s));

@@ -26,7 +26,8 @@ inline Matrix3 axesAlong(const Vector3 &z)
   return R;
 }
 
-/* A slender rod from one point to another, of mass 1, x along it, with a thousandth of its moment about its axis */
+/* A slender rod of mass 1 from one point to another, with x along it; its moment of inertia about x is a thousandth of
+   that across */
 inline RigidBody rod(const Vector3 &from, const Vector3 &to)
 {
   RigidBody    b;
@@ -39,14 +40,14 @@ inline RigidBody rod(const Vector3 &from, const Vector3 &to)
   return b;
 }
 
-/* A pin of i and j at a point of space about an axis of space */
+/* A revolute joint of i and j at a point of space about an axis of space */
 inline hhtdae::Element pin(Scene &s, const std::string &name, Body i, Body j, const Vector3 &at,
                            const Vector3 &axis = Vector3(0, 0, 1))
 {
   return s.add(name, hhtdae::Revolute{s.markerAt(i, at, axesAlong(axis)), s.markerAt(j, at, axesAlong(axis))});
 }
 
-/* A crank of 1, a coupler and a rocker on the ground 3 apart, in the xy plane */
+/* A four-bar linkage in the xy plane: a crank of length 1, a coupler and a rocker on the ground at a distance of 3 */
 struct Linkage {
   Vector3 A{0, 0, 0}, B, C, D{3, 0, 0};
   Body    crank, coupler, rocker;
@@ -59,7 +60,8 @@ struct Linkage {
     const double  y = std::sqrt(std::max(0.0, coupler_length * coupler_length - x * x));
     C               = B + (x * d + y * Vector3(0, 0, 1).cross(d)) / r;
   }
-  /* shift: of the rocker, from where it belongs; the pins are made where the bodies would meet */
+  /* shift: initial displacement of the rocker from its assembled position; the pins are placed where the bodies meet
+     when assembled */
   void build(Scene &s, const RigidBody &crank_body, const Vector3 &shift = Vector3::Zero())
   {
     RigidBody b = rod(C, D);
@@ -75,7 +77,7 @@ struct Linkage {
   void build(Scene &s) { build(s, rod(A, B)); }
 };
 
-/* Bricard's mechanism (IFToMM benchmark A04): five rods, six revolutes, one degree of freedom */
+/* Bricard's mechanism (IFToMM benchmark A04): five rods, six revolute joints, one degree of freedom */
 inline void bricard(Scene &s)
 {
   const Vector3 P[6]    = {{0, 0, 0}, {1, 0, 0}, {1, -1, 0}, {1, -1, 1}, {0, -1, 1}, {0, 0, 1}};
@@ -90,7 +92,7 @@ inline void bricard(Scene &s)
   s.gravity({0, -9.81, 0});
 }
 
-/* n x n nodes of rods pinned in the xy plane, hung at one corner; its meshes are skewed squares */
+/* A net of n x n nodes of rods with pins in the xy plane, suspended at one corner; its meshes are skewed squares */
 inline void net(Scene &s, int n)
 {
   const auto                     at = [](int i, int j) { return Vector3(i + 0.2 * j, j - 0.1 * i, 0); };

@@ -1,4 +1,4 @@
-/* What the tests of the integrator share: a run as an object, errors and output caught, errors against references. */
+/* Shared by the tests of the integrator: a run as an object, capture of errors and output, errors against references */
 #ifndef HHTDAE_TESTS_SUPPORT_H
 #define HHTDAE_TESTS_SUPPORT_H
 
@@ -33,7 +33,7 @@ namespace hhtest
 using namespace hhtex;
 using Array = std::vector<double>;
 
-/* A PETSc call that has to succeed: GoogleTest turns the exception into a failure */
+/* Calls a PETSc function that must succeed; GoogleTest turns the exception into a failure */
 inline void must(PetscErrorCode code)
 {
   if (code) throw std::runtime_error("PETSc error " + std::to_string((int)code));
@@ -49,10 +49,10 @@ inline std::string text(const char *format, ...)
   return buffer;
 }
 
-/* Measured figures appear in the output of the test */
+/* Prints measured figures in the output of the test */
 #define MEASURED(...) std::printf("[ MEASURED ] %s\n", hhtest::text(__VA_ARGS__).c_str())
 
-/* While it lives, PETSc's errors are returned and their first message is kept in place of the printed trace */
+/* During its lifetime PETSc's errors are returned, and their first message is stored instead of being printed with a trace */
 class ErrorTrap
 {
 public:
@@ -72,7 +72,7 @@ private:
   }
 };
 
-/* While it lives, what PETSc prints is kept in place of being printed */
+/* During its lifetime PETSc's output is stored instead of being printed */
 class Printed
 {
 public:
@@ -104,7 +104,7 @@ private:
   }
 };
 
-/* Options that hold while it lives, in place of those of the command line */
+/* During its lifetime these options replace those of the command line */
 class Options
 {
 public:
@@ -144,14 +144,14 @@ inline Array whole(Vec x)
   return result;
 }
 
-/* A problem with an integrator for it, set up from options */
+/* A problem with a TS for it, set up from options */
 class Simulation
 {
 public:
   TS             ts = nullptr;
   Vec            U = nullptr, V = nullptr;
   const Problem &problem;
-  /* Called after the start and after every accepted step, by TSSolve() */
+  /* Called by TSSolve() after the start and after every accepted step */
   std::function<void(Simulation &, PetscInt step, double t)> watch;
 
   Simulation(const Problem &p, const std::string &options, MPI_Comm comm = PETSC_COMM_SELF, bool setRoles = false)
@@ -219,7 +219,7 @@ public:
 private:
   std::string options_;
 
-  /* An object constructed by this one is destroyed even if the other constructor then throws */
+  /* Delegated constructor: once it has completed, the destructor runs even if the other constructor throws */
   struct Empty {
   };
   Simulation(const Problem &p, const std::string &options, Empty) : problem(p), options_(options) {}
@@ -232,7 +232,7 @@ private:
   }
 };
 
-/* Steps of one length, corrections solved to rounding */
+/* Options for steps of constant length with corrections solved almost to rounding */
 inline std::string fixedSteps(double h)
 {
   return text(" -ts_adapt_type none -ts_dt %.17g -ts_rtol 1e-8 -ts_atol 1e-8 -ts_hhtdae_corrector_tolerance 1e-3 ", h);
@@ -273,7 +273,7 @@ inline double norm(const Array &x)
   return std::sqrt(s);
 }
 
-/* Largest difference relative to the largest entry of b; of arrays of other lengths infinite */
+/* Largest difference relative to the largest entry of b; infinite for arrays of different lengths */
 inline double relativeDifference(const Array &a, const Array &b)
 {
   if (a.size() != b.size()) return PETSC_INFINITY;
@@ -295,7 +295,7 @@ template <class P, class... Args> Factory factory(const char *name, Args... args
   return {name, [=] { return std::unique_ptr<Problem>(new P(args...)); }};
 }
 
-/* Every example problem, small and short */
+/* All example problems in small and short versions */
 inline std::vector<Factory> allProblems()
 {
   return {factory<Pendulum>("pendulum", -90., 0., 1.),

@@ -1,4 +1,4 @@
-/* A problem whose Newton matrix is symmetric, and runs whose matrix holds one triangle */
+/* A problem with a symmetric Newton matrix, and runs whose matrix stores one triangle */
 #ifndef HHTDAE_TESTS_TRIANGLE_H
 #define HHTDAE_TESTS_TRIANGLE_H
 
@@ -7,8 +7,8 @@
 namespace hhtest
 {
 
-/* Ten point masses in space on springs, pairs of them and one with the ground held apart by six rods: 36 unknowns. The rod of
-   the last pair can be there twice, or no rods at all. */
+/* Ten point masses in space connected by springs; six rods of fixed length connect pairs of masses, or a mass and the
+   ground: 36 unknowns. The last rod may be present twice, or all rods may be left out */
 enum class NetRods { Independent, Redundant, None };
 
 struct Net : Problem {
@@ -82,7 +82,7 @@ struct Net : Problem {
   }
 
 private:
-  /* of its length at the start times a factor; an anchor is off the point by (0.3, 1, 0.5) */
+  /* adds a link whose rest length is its initial length times `factor`; an anchor is at (0.3, 1, 0.5) from the point */
   void link(std::vector<Link> &to, int i, int j, double factor)
   {
     Link   s{i, j, {start[3 * i] + 0.3, start[3 * i + 1] + 1, start[3 * i + 2] + 0.5}, 0};
@@ -120,7 +120,7 @@ private:
   }
 };
 
-/* A run with all of the matrix (block 0) or with one triangle of it in blocks of that size, which TSSetFromOptions() sees */
+/* A run with the full matrix (block 0) or with one triangle in blocks of this size, which exists before TSSetFromOptions() */
 struct TriangleRun {
   Array            q, lambda;
   TSHHT3Statistics s;
@@ -171,7 +171,7 @@ private:
   }
 };
 
-/* Counts alike, coordinates to rounding, and multipliers to what rounding of q leaves of them */
+/* Equal counters; coordinates equal to rounding; multipliers to the error that the rounding of q causes */
 inline void expectSame(const TriangleRun &a, const TriangleRun &b)
 {
   ASSERT_EQ(a.error, 0);

@@ -138,7 +138,7 @@ struct Tumbling : Problem {
     equations(u, v, a, f);
   }
 
-  /* A complex step in the direction of every unknown */
+  /* Jacobian by complex steps in the direction of every unknown */
   void jacobian(double, const double *u, const double *v, const double *a, double sv, double sa,
                 Entries &E) const override
   {
@@ -155,7 +155,7 @@ struct Tumbling : Problem {
     }
   }
 
-  /* Attitude, angular velocity and acceleration in the body's frame, multipliers: largest errors */
+  /* Largest errors of attitude, angular velocity and angular acceleration in body axes, and of multipliers */
   struct Errors {
     double q = 0., v = 0., a = 0., lambda = 0.;
   };
@@ -199,7 +199,7 @@ struct Tumbling : Problem {
   }
 
 private:
-  mutable Extrapolation solution_; /* A by rows, w in the body's frame */
+  mutable Extrapolation solution_; /* attitude A by rows, w in body axes */
 
   static Frame orientation0()
   {
@@ -261,15 +261,15 @@ private:
   }
 };
 
-/* New frames: where sin(theta) < 0.4, and in every `often`-th step if that is not 0 */
+/* Changes to new frames where sin(theta) < 0.4, and in every `often`-th step if that is not 0 */
 class FrameChanges
 {
 public:
   int                   often;
-  bool                  twist = true;    /* or the frames stay as they are: a change that changes nothing */
-  int                   last  = 1 << 30; /* step of those forced */
+  bool                  twist = true;    /* false: the frame is replaced by itself, a change without effect */
+  int                   last  = 1 << 30; /* last step with a forced change */
   int                   tests = 0, commits = 0;
-  std::function<void()> beforeChange, afterChange; /* called by the test, if it wants a change, and by the commit */
+  std::function<void()> beforeChange, afterChange; /* callbacks before the change, in the test, and after the commit */
 
   FrameChanges(Simulation &run, const Tumbling &p, int every = 0, bool turnOver = true)
       : often(every), p_(p), turn_(turnOver)

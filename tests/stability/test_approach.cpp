@@ -1,5 +1,4 @@
-/* Bodies in free flight, where the error estimate is zero whatever the step, do not fly through what is in their way.
- */
+/* In free flight the error estimate is zero for every step size; bodies must nevertheless not fly through an obstacle */
 #include "hhtdae/scene.h"
 #include "support.h"
 
@@ -15,7 +14,7 @@ struct Flight {
   PetscInt steps  = 0;
 };
 
-/* The lowest height of a channel, at the ends of steps and between them */
+/* Lowest value of a channel, sampled at the ends of steps and between them */
 Flight fly(hhtdae::Scene &scene, double end, const std::string &options, bool limited)
 {
   struct Watch {
@@ -61,7 +60,7 @@ hhtdae::RigidBody ball(double height, double speed)
 
 constexpr double radius = 0.1;
 
-/* speed: upwards, at the start */
+/* speed: initial velocity upwards */
 Flight ontoBox(double speed, const std::string &options, bool limited = true)
 {
   hhtdae::Scene scene(PETSC_COMM_SELF);
@@ -100,7 +99,7 @@ TEST(Approach, NoBallFliesThroughABoxOrABall)
     }
 }
 
-/* What the test above would find if nothing limited the steps */
+/* Control experiment: without a limit of the steps some bodies fly through, so that the test above is not vacuous */
 TEST(Approach, WithoutALimitSomeDo)
 {
   int through = 0;
@@ -113,7 +112,7 @@ TEST(Approach, WithoutALimitSomeDo)
   EXPECT_GT(through, 0);
 }
 
-/* A function of the application's own, on a problem in free flight */
+/* TSHHT3SetStepLimit() with a function of the application, on a problem in free flight */
 TEST(Approach, StepsAreAsLongAsTheApplicationAllows)
 {
   HeavyTop     p(.2);

@@ -1,5 +1,5 @@
-/* Little numerical damping on systems with constraints: what excites the multipliers' oscillation must not fill the error
-   test with it */
+/* Constrained systems with little numerical damping: whatever excites oscillations of the multipliers, such as the
+   remaining error of the corrector, must not dominate the error test */
 #include "support.h"
 #include "integrator/formulas.h"
 
@@ -24,7 +24,8 @@ Outcome run(const Problem &p, const std::string &options)
   return {(int)s.statistics().steps, e.q, e.v};
 }
 
-/* What much damping gives, the worse of two runs: in one alone the errors at the end may cancel */
+/* The result with much damping, as a reference: the worse of two runs, because in a single run the errors at the end
+   may cancel */
 Outcome muchDamping(const Problem &p)
 {
   const Outcome a = run(p, " -ts_hhtdae_alpha -0.3"), b = run(p, " -ts_hhtdae_alpha -0.1");
@@ -54,7 +55,7 @@ TEST(LittleDamping, StepsAndErrorsStayWhatTheyAre)
   }
 }
 
-/* The same damping by a spectral radius */
+/* Little damping set by a spectral radius */
 TEST(LittleDamping, SpectralRadius)
 {
   for (const Factory &f : constrained()) {
@@ -69,7 +70,7 @@ TEST(LittleDamping, SpectralRadius)
   }
 }
 
-/* Nothing is damped: these runs are short enough to come to their end */
+/* Without any numerical damping; these runs are short enough to complete */
 TEST(LittleDamping, NoneAtAll)
 {
   for (const Factory &f : constrained()) {
@@ -90,7 +91,7 @@ TEST(LittleDamping, ToleranceOfTheCorrector)
   EXPECT_DOUBLE_EQ(tolerance(0.), 1e-8);
 }
 
-/* -ts_view shows what is in force, and a value of the user's is not touched */
+/* -ts_view shows the corrector tolerance in use; a value set by the user is not changed */
 TEST(LittleDamping, UsersToleranceStands)
 {
   const Pendulum p(-90., 0., .1);

@@ -1,4 +1,4 @@
-/* Mechanisms whose motions are given, all or beside others: what is asked for are the forces that it takes */
+/* Mechanisms whose motion is prescribed, wholly or in part: the forces that drive them must be accurate */
 #include "support.h"
 
 using namespace hhtest;
@@ -6,8 +6,9 @@ using namespace hhtest;
 namespace
 {
 
-/* A planar body of 2 kg and 0.1 kg m^2 that is led along x, x(t) = sin(3 t), on a guide through the origin that it must not turn about: the force
-   of the guide, which holds a varying load, has the lever arm x. Beside it, if asked for, swings a pendulum of 1 kg and 1 m. */
+/* A planar body of 2 kg and 0.1 kg m^2 whose position x(t) = sin(3 t) is prescribed, on a guide through the origin
+   that also prevents its rotation. The guide carries a varying load with the lever arm x. Optionally a pendulum of 1
+   kg and 1 m swings beside it */
 struct Carriage : Problem {
   const double m = 2., I = 0.1;
   explicit Carriage(bool pendulum)
@@ -66,8 +67,9 @@ struct Carriage : Problem {
 
 } // namespace
 
-/* Corrections of the positions of what is driven are rounding and say nothing of its multipliers: one correction with the matrix of an earlier
-   step left 4e-3 of the loads. They are to be as good as the accelerations of what is free. */
+/* Corrections of prescribed positions are rounding errors and say nothing about the multipliers: after one correction
+   with the matrix of an earlier step 4e-3 of the loads were not balanced. The multipliers must be as accurate as the
+   accelerations of free coordinates */
 TEST(Driven, ForcesOfGivenMotions)
 {
   for (bool pendulum : {false, true})
@@ -93,7 +95,8 @@ TEST(Driven, ForcesOfGivenMotions)
     }
 }
 
-/* The rod of a pendulum that hangs straight down holds one coordinate, for the moment: no residual is spent on it later */
+/* While a pendulum hangs straight down, its rod seems to prescribe one coordinate. Once the pendulum has turned, no
+   residuals are spent on this coordinate any more */
 TEST(Driven, FreeAfterAll)
 {
   const Pendulum down(-90., 2., 2.), aside(-80., 2., 2.);

@@ -95,7 +95,7 @@ TEST(Events, BouncingBall)
   EXPECT_EQ(counted, s.steps);
 }
 
-/* An event on a mechanism with constraints: the pendulum passes its lowest point, nothing is changed there */
+/* An event on a constrained mechanism: the pendulum passes its lowest point, and the handler changes nothing */
 TEST(Events, PendulumPassesItsLowestPoint)
 {
   const Pendulum      p(-60., 1., 5.);
@@ -123,7 +123,7 @@ TEST(Events, PendulumPassesItsLowestPoint)
   EXPECT_LT(e.lambda, 1e-3);
 }
 
-/* A step taken back and taken again gives the same bits */
+/* A step that is rolled back and repeated gives the same bits */
 TEST(Events, RollBackRepeatsTheStep)
 {
   const Pendulum pendulum(-60., 1., 1.);
@@ -150,7 +150,7 @@ TEST(Events, RollBackRepeatsTheStep)
     }
 }
 
-/* Rolled back and repeated with half the step */
+/* A step is rolled back and repeated with half its length */
 TEST(Events, RollBackAndAShorterStep)
 {
   const Pendulum p(-60., 1., 1.);
@@ -179,7 +179,7 @@ TEST(Events, RestartStep)
   EXPECT_LT(run.errors().lambda, 1e-2);
 }
 
-/* A velocity given anew in a post-step function, without a word to TS */
+/* Velocities changed in a post-step function are noticed without any call that tells the TS */
 TEST(Events, ChangeInAPostStepFunctionIsNoticed)
 {
   const Oscillators p({1.}, {0.}, false, 10.);
@@ -194,7 +194,7 @@ TEST(Events, ChangeInAPostStepFunctionIsNoticed)
     if (t > 2. && turned == 0.) {
       turned = t;
       PetscCall(TS2GetSolution(ts, &U, &V));
-      PetscCall(VecScale(V, -1.)); /* time runs backwards from here */
+      PetscCall(VecScale(V, -1.)); /* from here the motion runs backwards */
     }
     PetscFunctionReturn(0);
   };
@@ -204,8 +204,8 @@ TEST(Events, ChangeInAPostStepFunctionIsNoticed)
   EXPECT_NEAR(run.u()[0], std::cos(10. - 2. * turned), 1e-3);
 }
 
-/* Looking at the solution, or writing the same velocities, is no change. (Write access to U in a post-step function is
-   one for PETSc itself, which then calls TSRestartStep().) */
+/* Reading the solution, or writing the same velocities, does not count as a change. (Write access to U in a post-step
+   function is a change for PETSc itself, which then calls TSRestartStep().) */
 TEST(Events, TouchingIsNoChange)
 {
   const Pendulum p(-60., 1., 1.);

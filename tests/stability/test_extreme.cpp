@@ -1,4 +1,4 @@
-/* The quick ones among the cases of the program `stability`, in both forms: every case has its acceptance figure */
+/* The fast ones among the cases of the program `stability`, in both forms, each with its acceptance */
 #include "support.h"
 #include <hhtdae/scene.h>
 

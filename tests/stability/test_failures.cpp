@@ -1,4 +1,5 @@
-/* Failures: residuals that are not numbers, now and then or for ever, steps that cannot succeed, budgets */
+/* Failures: residuals that are NaN or infinite, now and then or permanently; steps that cannot succeed; limits of the
+   number of steps and failures */
 #include "support.h"
 
 using namespace hhtest;
@@ -6,7 +7,7 @@ using namespace hhtest;
 namespace
 {
 
-/* A pendulum whose residual is spoiled when `bad` says so */
+/* A pendulum whose residual is replaced by `value` in calls for which `bad` is true */
 struct Spoiled : Pendulum {
   std::function<bool(int call, double t)> bad;
   double                                  value;
@@ -39,7 +40,8 @@ TEST(Failures, NotANumberNowAndThenCutsTheStep)
   }
 }
 
-/* A force that is not defined beyond some velocity: shorter steps keep out of it */
+/* A residual that is NaN or infinite from t = 0.5 on ends the run with an error that names the row; the last accepted
+   state stays valid */
 TEST(Failures, NotANumberForEverIsAnErrorThatNamesTheRow)
 {
   for (double value : {(double)NAN, (double)INFINITY}) {
@@ -59,10 +61,10 @@ TEST(Failures, NotANumberForEverIsAnErrorThatNamesTheRow)
     EXPECT_TRUE(trap.says("equation of motion")) << trap.message;
     EXPECT_TRUE(trap.says("last accepted state")) << trap.message;
     EXPECT_EQ(run.t(), last);
-    EXPECT_LT(relativeDifference(run.u(), u), 1e-5); /* the next attempt has projected it */
+    EXPECT_LT(relativeDifference(run.u(), u), 1e-5); /* the next attempt has projected the state */
     EXPECT_LT(relativeDifference(run.v(), v), 1e-5);
     EXPECT_NEAR(last, .5, 1e-2);
-    /* closing in on t = 1/2 makes steps as short as rounding, which must not spoil what has been accepted */
+    /* near t = 1/2 steps become as short as rounding, which must not spoil the accepted state */
     const ProblemErrors e = run.errors();
     MEASURED("residual %g from t = 0.5 on: stops at t = %.17g with errors q %.1e, q' %.1e, lambda %.1e", value, last,
              e.q, e.v, e.lambda);
@@ -82,7 +84,7 @@ TEST(Failures, NotANumberAtTheStart)
   EXPECT_TRUE(trap.says("not a number")) << trap.message;
 }
 
-/* -ts_error_if_step_fails 0: a reason in place of an error, and the last good state */
+/* With -ts_error_if_step_fails 0 the run ends with a TSConvergedReason in place of an error, in the last accepted state */
 TEST(Failures, ReasonInPlaceOfAnError)
 {
   const Spoiled p(2., NAN, [](int, double t) { return t > .5; });
@@ -109,7 +111,8 @@ TEST(Failures, TooManyRejections)
   EXPECT_TRUE(trap.says("rejected too often")) << trap.message;
 }
 
-/* The cause is that of the last rejection: a domain of the application's, a tolerance below rounding */
+/* The error message names the cause of the last rejection: a domain error of the application, a tolerance below
+   rounding, and others */
 TEST(Failures, CauseOfTheLastRejection)
 {
   const Pendulum p(-90., 0., 1.);
@@ -137,7 +140,7 @@ TEST(Failures, TooManyFailedCorrections)
   EXPECT_LT(run.errors().q, 1e-3);
 }
 
-/* The error test itself cannot be met: too small a smallest step */
+/* The error test cannot be met because the smallest allowed step is too large */
 TEST(Failures, SmallestStepTooLarge)
 {
   const Pendulum p(-60., 1., 2.);
@@ -165,7 +168,7 @@ TEST(Failures, StepBudget)
   EXPECT_LT(run.errors().q, 1e-5);
 }
 
-/* A run that failed can be taken up again once the cause is gone */
+/* A run that failed can be continued after the cause has been removed */
 TEST(Failures, GoOnAfterAFailure)
 {
   bool          broken = true;
@@ -181,7 +184,7 @@ TEST(Failures, GoOnAfterAFailure)
   EXPECT_LT(run.errors().q, 2e-3);
 }
 
-/* The application's own error passes through */
+/* An error code of the application's function is returned unchanged */
 TEST(Failures, ErrorOfTheApplication)
 {
   TS   ts;
@@ -228,7 +231,7 @@ TEST(Failures, ErrorOfTheApplication)
 namespace
 {
 
-/* A pendulum whose rod is gone after the start, which leaves the multiplier without an equation */
+/* A pendulum whose constraint vanishes after the start, so that no equation determines the multiplier */
 struct Detached : Pendulum {
   Detached() : Pendulum(-60., 1., 1.) {}
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override
@@ -246,7 +249,7 @@ struct Detached : Pendulum {
 
 } // namespace
 
-/* Steps so short that they go without the corrector (1e-9) must notice a singular matrix as the others (1e-2) do */
+/* A singular matrix is noticed in steps so short that they are made without the corrector (1e-9) as in ordinary ones (1e-2) */
 TEST(Failures, SingularMatrixIsAFailedStepOfAnySize)
 {
   for (double h : {1e-9, 1e-2}) {
@@ -264,7 +267,7 @@ TEST(Failures, SingularMatrixIsAFailedStepOfAnySize)
 namespace
 {
 
-/* A pendulum with any one row spoiled from t = 1/2 on */
+/* A pendulum one of whose rows is spoiled from t = 1/2 on */
 struct SpoiledRow : Pendulum {
   int    row;
   double value;
@@ -278,7 +281,8 @@ struct SpoiledRow : Pendulum {
 
 } // namespace
 
-/* Whatever row it is, constraints too, which the start differentiates: no crawling with steps below rounding */
+/* A spoiled row of any kind, also of constraints, which the start differentiates, ends the run soon; it must not
+   proceed by ever shorter steps below rounding */
 TEST(Failures, NotANumberInAnyRowStopsTheRunSoon)
 {
   for (double value : {(double)NAN, (double)INFINITY})
@@ -308,7 +312,7 @@ TEST(Failures, NotANumberInAnyRowStopsTheRunSoon)
 namespace
 {
 
-/* A pendulum with a Jacobian that is singular in every fifth call */
+/* A pendulum whose Jacobian is singular in every fifth call */
 struct SingularNowAndThen : Pendulum {
   mutable int calls = 0;
   SingularNowAndThen() : Pendulum(-60., 1., 2.) {}
@@ -323,7 +327,7 @@ struct SingularNowAndThen : Pendulum {
 
 } // namespace
 
-/* Failures that have nothing to do with h must not bring it down for ever */
+/* Failures that have nothing to do with h must not reduce h permanently */
 TEST(Failures, SingularMatrixNowAndThen)
 {
   const SingularNowAndThen p;
@@ -341,7 +345,8 @@ TEST(Failures, SingularMatrixNowAndThen)
 namespace
 {
 
-/* Two masses on a rod that falls and spins: (x1, y1, x2, y2, lambda), |x2 - x1|^2/2 = 1/2. At t = 1/2 a force of 1e70, 25 residuals long, pulls at one of them, if they are not looked at where they started. */
+/* Two masses on a rod that falls and spins: (x1, y1, x2, y2, lambda), |x2 - x1|^2/2 = 1/2. From t = 1/2 on a force of
+   1e70 acts on one mass for 25 evaluations of the residual; evaluations at the initial positions do not trigger it */
 struct Dumbbell : Problem {
   static constexpr double mass[2] = {1., 2.}, g = 9.81, spin = 3.;
   mutable int             calls   = 0;
@@ -389,7 +394,8 @@ struct Dumbbell : Problem {
 
 } // namespace
 
-/* The matrix that then projects the velocities is that of the last accepted state */
+/* After failed corrections the velocities are projected with a matrix of the last accepted state, not one of the
+   failed correction with its huge multipliers */
 TEST(Failures, MultipliersOfAFailedCorrection)
 {
   const Dumbbell p;

@@ -1,4 +1,4 @@
-/* Step sizes at the edges: tiny and huge steps, slivers at the end, corrections at rounding level */
+/* Extreme step sizes: tiny and huge steps, final times just beyond the end of a step, corrections of the size of rounding */
 #include "support.h"
 
 using namespace hhtest;
@@ -26,7 +26,7 @@ double energy(const Pendulum &p, const Array &u, const Array &v)
 
 } // namespace
 
-/* From a start at rest with given h: every h gives numbers, small ones without noise in the accelerations */
+/* A start with a given h: for every h the results are finite, and for small h the accelerations contain no noise */
 TEST(Steps, TinyAndHuge)
 {
   const Pendulum pendulum(-60., 1., 10.);
@@ -45,7 +45,7 @@ TEST(Steps, TinyAndHuge)
       }
       Array ur(p->n), vr(p->n), ar(p->n);
       if (h > 2e-6 || !p->reference(p->referenceEverywhere() ? run.t() : 0., ur.data(), vr.data(), ar.data())) continue;
-      /* after at most 20 steps of 1e-6 the acceleration is that of the reference, or nearly the initial one */
+      /* after at most 20 steps of 1e-6 the acceleration is that of the reference, or close to the initial one */
       double worst = 0., scale = 1e-3, lambda = 0., lscale = 1e-3;
       for (PetscInt i = 0; i < p->n; i++)
         if (p->role[i] == TSHHT3_COORDINATE) {
@@ -57,13 +57,13 @@ TEST(Steps, TinyAndHuge)
         }
       MEASURED("%-9s %d steps of %g: q'' to %.1e, lambda to %.1e relative; %d by Taylor series", p->name.c_str(), n, h,
                worst / scale, lambda / lscale, (int)run.statistics().tiny_steps);
-      EXPECT_LT(worst / scale, 5e-2); /* the corrector is trusted to a noise of some percent */
+      EXPECT_LT(worst / scale, 5e-2); /* the corrector's result may contain a noise of some percent */
       EXPECT_LT(lambda / lscale, 5e-2);
     }
   }
 }
 
-/* Fixed steps down to where rounding of q, eps/(beta h^2), shows in the accelerations: the state stays good */
+/* Fixed steps so small that the rounding of q, eps/(beta h^2), is visible in the accelerations; the state stays accurate */
 TEST(Steps, SmallFixedStepsForALongTime)
 {
   for (double h : {1e-4, 1e-5}) {
@@ -78,7 +78,7 @@ TEST(Steps, SmallFixedStepsForALongTime)
   }
 }
 
-/* The final time lies a sliver beyond a whole number of steps */
+/* The final time is a whole number of steps plus or minus a tiny remainder; no tiny step may result */
 TEST(Steps, NoSliverAtTheEnd)
 {
   for (double sliver : {-1e-10, -1e-13, -1e-15, 0., 1e-15, 1e-13, 1e-10, 1e-7})
@@ -96,8 +96,7 @@ TEST(Steps, NoSliverAtTheEnd)
     }
 }
 
-/* The defect that a corrector without a notion of rounding has: it can never be satisfied, and smaller steps are worse
- */
+/* A corrector that does not know the level of rounding can never meet its tolerance there, and smaller steps make it worse */
 TEST(Steps, CorrectorStopsAtRounding)
 {
   for (const char *c : {"1e-3", "1e-6", "1e-12"})
@@ -125,12 +124,12 @@ TEST(Steps, ToleranceBelowRounding)
              TSConvergedReasons[run.reason()], run.t(), (int)s.steps, (int)s.rejected, (int)s.corrector_fails, e.q);
     EXPECT_NE(run.reason(), TS_CONVERGED_TIME);
     EXPECT_LT(run.t(), p->t1);
-    EXPECT_GT(s.steps, 50); /* as far as it goes */
+    EXPECT_GT(s.steps, 50); /* as far as possible */
     EXPECT_LT(e.q, 1e-12);
   }
 }
 
-/* Any first step, however bad, is brought to one that fits the tolerance */
+/* Any first step, however unsuitable, leads to steps that fit the tolerance */
 TEST(Steps, AnyFirstStep)
 {
   for (double h : {1e-12, 1e-6, .1, 1., 10.}) {
@@ -146,7 +145,7 @@ TEST(Steps, AnyFirstStep)
   }
 }
 
-/* Over the top and back: near the inverted position the motion is slowest, and steps longest */
+/* A pendulum that swings through its inverted position and back; there the motion is slowest and the steps are longest */
 TEST(Steps, PendulumThroughItsInvertedPosition)
 {
   for (double angle : {179.9, 180. - 1e-3}) {

@@ -6,8 +6,8 @@ using namespace hhtest;
 namespace
 {
 
-/* A chain of two point masses on massless rods, masses m1 and m2, in absolute coordinates. Starts straight: folded, a
-   heavy end would snap the light middle, and accelerations would be those of an impact. */
+/* A chain of two point masses m1 and m2 on massless rods, in absolute coordinates. It starts stretched: from a folded
+   position a heavy end would accelerate the light mass like an impact */
 struct Masses : Problem {
   const double m[2], g = 9.81;
   Masses(double m1, double m2, double end) : m{m1, m2}
@@ -59,8 +59,8 @@ struct Masses : Problem {
   }
 };
 
-/* Masses of 1 kg in a row, far from the origin, each held by a brake on the one before it (the first on the ground): k s tanh(v/s), and
-   pushed. They stay at rest, v = 1e-12 m/s. */
+/* Masses of 1 kg in a row, far from the origin, each connected to the one before it (the first one to the ground) by a
+   brake with the force k s tanh(v/s), and pushed by loads. They practically stay at rest, v = 1e-12 m/s */
 struct Brakes : Problem {
   const double k, slip, position;
   Brakes(int count, double stiffness, double slip_, double position_, double end) : k(stiffness), slip(slip_), position(position_)
@@ -99,7 +99,7 @@ struct Brakes : Problem {
   }
 };
 
-/* The largest force that nothing balances at the end of a step */
+/* Largest residual of the equations of motion at the ends of steps */
 void watchForces(Simulation &run, const Problem &p, double &unsolved)
 {
   run.watch = [&](Simulation &r, PetscInt step, double t) {
@@ -120,7 +120,7 @@ double energy(const FourBar &p, const Array &u, const Array &v)
   return E;
 }
 
-/* Pairs of masses of 1 kg with a stiff spring between them, which swing on soft ones: q1'' + q1 + k (q1 - q2) = 0, ... */
+/* Pairs of masses of 1 kg with a stiff spring between them and soft springs to the ground: q1'' + q1 + k (q1 - q2) = 0, ... */
 struct Pairs : Problem {
   const double k;
   Pairs(PetscInt pairs, double stiffness) : k(stiffness)
@@ -177,10 +177,10 @@ TEST(Stiff, MassRatios)
   }
 }
 
-/* The fast mode is damped away, the slow one is that of a rigid rod: error control must not follow the fast one */
+/* The fast mode is damped out, and the slow one is that of a rigid rod: the error control must not follow the fast mode */
 TEST(Stiff, Springs)
 {
-  for (double k : {1e6, 1e9, 1e12}) { /* N/m at 1 kg */
+  for (double k : {1e6, 1e9, 1e12}) { /* N/m, with masses of 1 kg */
     const SpringPendulum p(k, 2.);
     const Pendulum       rod(90., 0., 2.);
     Simulation           run(p, tolerance(1e-6));
@@ -199,7 +199,7 @@ TEST(Stiff, Springs)
   }
 }
 
-/* A linear oscillator of 1e12 N/m beside one of 1 N/m, excited, at fixed steps: the slow one does not notice */
+/* A linear oscillator of 1e12 N/m beside one of 1 N/m, both excited, at fixed steps: the slow mode is not disturbed */
 TEST(Stiff, FastModeBesideASlowOne)
 {
   const Oscillators p({1., 1e6}, {0., 0.}, true, 10.);
@@ -212,12 +212,13 @@ TEST(Stiff, FastModeBesideASlowOne)
            std::abs(y0 - std::cos(10.)), std::abs(y1));
   EXPECT_NEAR(y0, std::cos(10.), 1e-3);
   EXPECT_LT(std::abs(y1), 1e-6);
-  /* forces of the fast mode are rounding; taken for less than that, they fail corrections and cut h */
+  /* The forces of the fast mode are at the level of rounding. If that level is underestimated, corrections fail and h
+     is reduced */
   EXPECT_EQ(run.statistics().steps, 1000);
   EXPECT_EQ(run.statistics().corrector_fails, 0);
 }
 
-/* The four-bar mechanism passes the position where Phi_q loses rank twice a turn */
+/* Twice a turn the four-bar mechanism passes a position in which Phi_q loses rank */
 TEST(Stiff, FourBarThroughItsSingularPosition)
 {
   for (const char *options : {"", "-ts_hhtdae_alpha -0.05"}) {
@@ -246,8 +247,9 @@ TEST(Stiff, FourBarThroughItsSingularPosition)
   }
 }
 
-/* There rounding of Phi is magnified by 1/cos of the uprights' angle. Taken for the level of rounding ever after, it made the error grow as
-   h fell: 5e-5 for N = 2 at the second h, 4e-4 at the last. */
+/* In the singular position the rounding of Phi is magnified by 1/cos of the uprights' angle. When this was taken for
+   the level of rounding for the rest of the run, the error grew with decreasing h: 5e-5 for N = 2 at the second h,
+   4e-4 at the last */
 TEST(Stiff, FourBarsAtFixedSteps)
 {
   for (int windows : {2, 10}) {
@@ -266,7 +268,7 @@ TEST(Stiff, FourBarsAtFixedSteps)
   }
 }
 
-/* Tolerances near and below what rounding leaves of a correction in the singular position */
+/* Tolerances near and below the rounding errors of corrections in the singular position */
 TEST(Stiff, FourBarsAtToleranceNearRounding)
 {
   for (int windows : {1, 10}) {
@@ -277,7 +279,7 @@ TEST(Stiff, FourBarsAtToleranceNearRounding)
       MEASURED("fourbar N = %d, tolerance %g: error q %.2e; %d steps", windows, eps, run.errors().q, (int)run.statistics().steps);
       EXPECT_LT(run.errors().q, 1e-4);
     }
-    for (double eps : {1e-11, 1e-14}) { /* 38 million iterations before an error, at 1e-11 */
+    for (double eps : {1e-11, 1e-14}) { /* once 38 million iterations before an error, at 1e-11 */
       Simulation run(p, tolerance(eps) + "-ts_adapt_type none -ts_dt 2.5e-4");
       must(run.solve());
       const TSHHT3Statistics s = run.statistics();
@@ -287,7 +289,7 @@ TEST(Stiff, FourBarsAtToleranceNearRounding)
       EXPECT_LT(s.residuals, 5 * s.steps);
       EXPECT_LT(run.errors().q, 1e-5);
     }
-    Simulation run(p, tolerance(1e-13) + "-ts_error_if_step_fails 0 -ts_max_steps 10000000"); /* no step can pass: a word, and soon */
+    Simulation run(p, tolerance(1e-13) + "-ts_error_if_step_fails 0 -ts_max_steps 10000000"); /* no step passes: ends soon, with a reason */
     must(run.solve());
     MEASURED("fourbar N = %d, tolerance 1e-13: %s at t = %g after %d iterations", windows, TSConvergedReasons[run.reason()], run.t(), (int)run.statistics().newton);
     EXPECT_TRUE(run.reason() < 0 || run.errors().q < 1e-4);
@@ -295,7 +297,7 @@ TEST(Stiff, FourBarsAtToleranceNearRounding)
   }
 }
 
-/* A long chain lets go and falls: nothing but energy to judge by */
+/* A long chain is released and falls; the reference is its energy */
 TEST(Stiff, ChainKeepsItsEnergy)
 {
   double before = 0.;
@@ -317,8 +319,9 @@ TEST(Stiff, ChainKeepsItsEnergy)
   }
 }
 
-/* What stands still in a steep brake is held by its load. Rounding of positions taken for one of velocities, too, was worth far more than
-   that at short steps: 2e3, 8e1 and 2e1 N were left of loads of 3 N. */
+/* A mass at rest in a steep brake must be in equilibrium with its load. When the rounding of positions was also
+   counted as rounding of velocities, residuals far above it were accepted at short steps: 2e3, 8e1 and 2e1 N of loads
+   of 3 N */
 TEST(Stiff, LoadsAtRestInSteepBrakes)
 {
   struct Case {
@@ -337,7 +340,8 @@ TEST(Stiff, LoadsAtRestInSteepBrakes)
   }
 }
 
-/* The same from rest by steps under error control: accelerations that the brakes take away at once are no part of the motion */
+/* The same under error control and from rest, with loads that set in at the start: accelerations that the brakes
+   remove at once are not part of the motion */
 TEST(Stiff, LoadsSetInOnSteepBrakesAtRest)
 {
   for (double k : {1e8, 1e10, 1e12}) {
@@ -347,12 +351,13 @@ TEST(Stiff, LoadsSetInOnSteepBrakesAtRest)
     watchForces(run, p, unsolved);
     must(run.solve());
     MEASURED("3 brakes of %g N s/m: %.1e N unsolved; %d steps, %d iterations", k, unsolved, (int)run.statistics().steps, (int)run.statistics().newton);
-    EXPECT_LT(unsolved, 1e-2);             /* of loads of some N; proofs leave up to 0.3 */
-    EXPECT_LT(run.statistics().steps, 60); /* 50 of them wait for loads, where nothing moves */
+    EXPECT_LT(unsolved, 1e-2);             /* of loads of some N; proofs allow up to 0.3 */
+    EXPECT_LT(run.statistics().steps, 60); /* 50 of them are short because loads may set in while nothing moves */
   }
 }
 
-/* Brakes in series that slide at the start, in directions that differ: all catch within microseconds, which the run has to step over */
+/* Brakes in series that slide in different directions at the start: all of them stop within microseconds, which the
+   steps have to pass over */
 TEST(Stiff, SlidingBrakesInSeriesCatch)
 {
   struct Sliding : Brakes {
@@ -376,7 +381,7 @@ TEST(Stiff, SlidingBrakesInSeriesCatch)
             if (t < 0.5) return;
             for (double x : r.v()) widen(fastest, std::abs(x));
           };
-          must(run.solve()); /* loads of some 20 N leave that over k */
+          must(run.solve()); /* loads of some 20 N keep velocities of this size over k */
           EXPECT_EQ(end, 1.) << eps << " " << position << " " << k << " " << count;
           EXPECT_LT(fastest, 100. / k + 1e-2 * eps * position) << eps << " " << position << " " << k << " " << count;
           steps += run.statistics().steps;
@@ -387,7 +392,8 @@ TEST(Stiff, SlidingBrakesInSeriesCatch)
   EXPECT_LT(failed, 200);
 }
 
-/* Of many stiff pairs some move together in any sample of rounding; their forces are rounding, too */
+/* Among many stiff pairs some residuals decrease together in any random sample of rounding; their forces are
+   nevertheless rounding errors */
 TEST(Stiff, FastModesOfManyPairs)
 {
   for (double k : {1e10, 1e11, 1e12, 1e14}) {

@@ -1,4 +1,4 @@
-/* Starts in the middle of a transient far faster than any step: what moves is held at once by strong damping */
+/* Starts with velocities that strong damping removes in a transient far shorter than any step */
 #include "hhtdae/scene.h"
 #include "support.h"
 
@@ -10,7 +10,7 @@ using namespace hhtdae;
 namespace
 {
 
-constexpr double length = 1., first_rate = 3., second_rate = -2., second_angle = 0.4; /* of the second rod, from the first, which lies along x */
+constexpr double length = 1., first_rate = 3., second_rate = -2., second_angle = 0.4; /* second rod: relative to the first, which lies along x */
 
 struct Rods {
   Scene  scene;
@@ -33,7 +33,7 @@ RigidBody rod(const Vector3 &at, double angle, const Vector3 &velocity, double r
   return b;
 }
 
-/* Two rods on pins, the first one of which is damped: both move at the start */
+/* Two rods on pins that both move at the start; the pin of the first one has a damper */
 void damped(Rods &r, double c)
 {
   const Vector3 elbow(length, 0, 0), speed(0, first_rate * length, 0);
@@ -50,7 +50,7 @@ void damped(Rods &r, double c)
   r.tip = r.scene.marker(two, {0.5 * length, 0, 0});
 }
 
-/* What is left of it: the first rod stops at once, and the second keeps its angular momentum about the elbow */
+/* The motion after the transient: the first rod is at rest, and the second keeps its angular momentum about the elbow */
 void stopped(Rods &r)
 {
   const Vector3 elbow(length, 0, 0), arm = 0.5 * length * Vector3(std::cos(second_angle), std::sin(second_angle), 0);
@@ -81,7 +81,8 @@ Path run(Rods &r, const std::string &options)
   return p;
 }
 
-/* Masses in a row between springs and strong dampers, held at one end, and gravity along the row that has just set in */
+/* Masses in a row connected by springs and strong dampers, fixed at one end, under gravity along the row, initially
+   undeformed */
 struct Row : Problem {
   const double k = 1e6, c = 1e5;
   Row()
@@ -119,7 +120,8 @@ struct Row : Problem {
 
 } // namespace
 
-/* The acceleration at the start is that of the transient: taken for that of a step, it throws the rods far beyond rest */
+/* The initial acceleration is that of the transient. If it were used for a whole step, the rods would be thrown far
+   beyond their rest position */
 TEST(StiffStart, StrongDampingStopsAtOnce)
 {
   const auto still = [](double eps, const char *steps) {
@@ -140,11 +142,12 @@ TEST(StiffStart, StrongDampingStopsAtOnce)
           MEASURED("%s, damper of %g N m s, tolerance %g%s: error %.1e in %d steps, %.1e in %d of the rod that hangs on a pin at rest", space == Space::Planar ? "planar" : "spatial", c, eps,
                    *steps ? ", fixed steps" : "", e, (int)p.stat.steps, without, (int)q.stat.steps);
           EXPECT_LT(e, 3 * without + 300 / c);
-          EXPECT_LT(p.stat.steps, 4 * q.stat.steps); /* at 1e6 the first steps resolve what they can */
+          EXPECT_LT(p.stat.steps, 4 * q.stat.steps); /* with 1e6 the first steps resolve part of the transient */
         }
 }
 
-/* Damping spreads the reaction at the end along the row, which is not taken for a transient, at the cost of more matrices */
+/* Damping spreads the reaction at the fixed end along the row. This is not a transient to be skipped, which would cost
+   additional matrices */
 TEST(StiffStart, SpreadingLoadsAreNoTransients)
 {
   const Row  p;
