@@ -25,7 +25,7 @@ inline Eigen::MatrixXd Numbers(Eigen::Index rows, Eigen::Index cols, double seed
       rows, cols, [seed](Eigen::Index i, Eigen::Index j) { return Number(seed, (double)i, (double)j); });
 }
 
-/* A row of 8-node bricks along x, the last of which is divided into 4-node tetrahedra; stress at two of three nodes */
+/* A row of 8-node bricks along x, with a 4-node tetrahedron in place of the last one; stress at two of three nodes */
 struct HandMade {
   ReducedBody body;
   PetscInt    bricks, nodes;

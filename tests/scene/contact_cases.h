@@ -1,4 +1,4 @@
-/* Contacts for tests: laws, random shapes that touch, and what happens between them */
+/* Contacts for tests: contact laws, random shapes that touch, and the force between them */
 #ifndef HHTDAE_TEST_CONTACT_CASES_H
 #define HHTDAE_TEST_CONTACT_CASES_H
 
@@ -26,7 +26,7 @@ inline ContactLaw SomeLaw(Random &random)
   return MakeLaw(random(1, 5), e, random(0, .5), random(0, 1), random(.5, 2));
 }
 
-/* Random shapes and, in place(), random frames in which they touch with penetrations between .05 and .3 */
+/* Random shapes; in place(): random frames in which they touch with penetrations between .05 and .3 */
 template <class Shape> struct Make;
 
 template <class Shape> void Press(const typename Shape::Data &d, Frame<double> *f, double depth)
@@ -52,12 +52,12 @@ template <> struct Make<SphereBoxShape> {
   static SphereBoxShape::Data data(Random &r) { return {r(.8, 2), {r(.5, 2), r(.5, 2), r(.5, 2)}}; }
 };
 
-/* The box's nearest point on a face, an edge or a corner: away from the borders between them, where the normal has a
- * kink */
+/* Places the sphere so that the box's nearest point is on a face, an edge or a corner, away from the borders between
+   these regions, where the normal has a kink */
 template <class Shape> void PutSomewhere(const typename Shape::Data &, Random &, Frame<double> *) {}
 template <> inline void     PutSomewhere<SphereBoxShape>(const SphereBoxShape::Data &d, Random &random, Frame<double> *f)
 {
-  const int    region = 1 + (int)random(0, 6.999); /* bits of the directions that are outside */
+  const int    region = 1 + (int)random(0, 6.999); /* one bit for each axis along which the centre is outside the box */
   Vec3<double> c;
   for (int k = 0; k < 3; k++) {
     const double sign = random(-1, 1) < 0 ? -1 : 1;
@@ -101,7 +101,7 @@ template <class Shape> struct Encounter {
     for (int k = 0; k < 2; k++) p += on[k].f.dot(w[k].v) + on[k].m.dot(w[k].w);
     return p;
   }
-  /* the frames moved along their twists */
+  /* penetration after the frames have moved along their twists for a time h */
   DynamicVector depthAfter(double h) const
   {
     Encounter moved(*this);

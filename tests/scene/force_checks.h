@@ -1,5 +1,4 @@
-/* What forces between two markers have to pass besides CheckForce(): the forms of a potential, dissipation, objectivity
- */
+/* Properties that forces between two markers must have in addition to CheckForce(): a potential, dissipation, objectivity */
 #ifndef HHTDAE_TESTS_FORCE_CHECKS_H
 #define HHTDAE_TESTS_FORCE_CHECKS_H
 
@@ -9,14 +8,14 @@
 namespace hhtdae
 {
 
-/* j turned from i by a random rotation that stays away from half a turn, where rotation vectors jump */
+/* Turns j from i by a random rotation that stays away from half a turn, where rotation vectors jump */
 inline void RelativeRotation(Random &random, Frame<double> *f, double largest = 2.9)
 {
   const Vec3<double> axis = random.direction();
   f[0].R                  = f[1].R * Eigen::AngleAxisd(random(0, largest), axis).toRotationMatrix();
 }
 
-/* jacobian written by hand against automatic differentiation of components() and apply(), which the force states use */
+/* Compares the hand-written jacobian() with automatic differentiation of components() and apply(), which force states use */
 template <class K, class Make> void CompareForce(const Make &make)
 {
   Random random(7);
@@ -37,8 +36,8 @@ template <class K, class Make> void CompareForce(const Make &make)
   }
 }
 
-/* kernels without damping are second derivatives of a potential: along R -> (1 + [theta]) R these are symmetric but for the
-   commutator of rotations, -[m] in the blocks of moments */
+/* The derivatives of kernels without damping are second derivatives of a potential: along R -> (1 + [theta]) R they
+   are symmetric except for the commutator of rotations, -[m] in the blocks of moments */
 template <class K, class Make> void ExpectSymmetric(const Make &make)
 {
   static_assert(!K::damped, "a potential alone makes a symmetric matrix");
@@ -55,7 +54,7 @@ template <class K, class Make> void ExpectSymmetric(const Make &make)
   }
 }
 
-/* the wrenches are minus the gradient of an energy */
+/* The wrenches are minus the gradient of an energy */
 template <class K, class Make, class Energy> void ExpectPotential(const Make &make, const Energy &energy)
 {
   Random random(5);
@@ -92,7 +91,8 @@ template <class K, class Make> void ExpectDissipative(const Make &make)
   EXPECT_GT(largest, .1) << "nothing was dissipated";
 }
 
-/* A rigid motion of everything turns the wrenches and leaves the components; a rigid twist adds no damping */
+/* A rigid motion of all markers turns the wrenches and leaves the components unchanged; a rigid twist produces no
+   damping force */
 template <class K, class Make> void ExpectObjective(const Make &make)
 {
   Random random(13);

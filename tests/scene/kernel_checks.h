@@ -57,7 +57,7 @@ public:
   }
   Mat3<double> rotation()
   {
-    const double angle = (*this)(-M_PI, M_PI); /* not the uniform measure, but everywhere */
+    const double angle = (*this)(-M_PI, M_PI); /* not uniformly distributed, but covering all rotations */
     return Eigen::AngleAxisd(angle, direction()).toRotationMatrix();
   }
   Frame<double> frame(double size = 2)
@@ -75,7 +75,7 @@ private:
   std::mt19937 engine_;
 };
 
-/* the frame moved by h in direction a: 0..2 shift, 3..5 turn about space axes through the origin */
+/* The frame moved by h in direction a: 0..2 translation, 3..5 rotation about space axes through the origin */
 inline Frame<double> Moved(Frame<double> f, int a, double h)
 {
   if (a < 3)
@@ -85,7 +85,7 @@ inline Frame<double> Moved(Frame<double> f, int a, double h)
   return f;
 }
 
-/* the derivative of g at 0 by differences of fourth order */
+/* Derivative of g at 0 by differences of fourth order */
 inline DynamicVector Difference(const std::function<DynamicVector(double)> &g, double h = 1e-4)
 {
   return (8 * (g(h) - g(-h)) - (g(2 * h) - g(-2 * h))) / (12 * h);
@@ -126,7 +126,7 @@ typename K::Data MakeData(const Make &make, Random &random, Frame<double> *f, Tw
     return make(random);
 }
 
-/* A random state of kernel K, with its further inputs z */
+/* A random state of kernel K with its additional inputs z */
 template <class K> struct Sample {
   static constexpr int M = K::markers, Z = K::inputs > 0 ? K::inputs : 1;
   Frame<double>        f[M];
@@ -143,10 +143,10 @@ template <class K> struct Sample {
     }
     for (int i = 0; i < Z; i++) z(i) = random(-2, 2);
     data = MakeData<K>(make, random, f, w);
-    if (!K::needs_rotation) /* whatever is done with it then shows */
+    if (!K::needs_rotation) /* NaN, so that any use of it becomes visible */
       for (int k = 0; k < M; k++) f[k].R.setConstant(std::numeric_limits<double>::quiet_NaN());
   }
-  /* g along direction a of all frames or twists */
+  /* Derivative of g along direction a of each frame or twist in turn */
   DynamicVector alongFrames(int a, const std::function<DynamicVector(const Sample &)> &g) const
   {
     return Difference([&](double h) {
@@ -183,7 +183,7 @@ template <class K> struct Sample {
 
 template <int N> DynamicVector ToVector(const double *x) { return Eigen::Map<const Matrix<N, 1>>(x); }
 
-/* J has nothing where the kernel says that it does not depend, H nothing where it is not curved: exactly nothing */
+/* J must be exactly zero where the kernel declares no dependence, H where it declares no curvature */
 template <class K, class Derived> void ExpectMasked(const Eigen::MatrixBase<Derived> &J, const char *what)
 {
   for (int a = 0; a < 2 * K::markers; a++) {
@@ -226,7 +226,7 @@ template <class K> DynamicVector Value(const Sample<K> &s)
 template <class K> typename K::Gradient Gradient(const Sample<K> &s)
 {
   typename K::Gradient J;
-  J.setConstant(std::numeric_limits<double>::quiet_NaN()); /* a kernel sets every entry */
+  J.setConstant(std::numeric_limits<double>::quiet_NaN()); /* NaN, because a kernel must set every entry */
   K::gradient(s.data, s.f, s.t, J);
   return J;
 }
@@ -239,7 +239,7 @@ template <class K> typename K::Hessian Curvature(const Sample<K> &s, const Dynam
   return H;
 }
 
-/* what Constraint<> would have given, where a kernel hides it by its own */
+/* Compares with the automatic derivatives of Constraint<>, which a kernel may replace by its own */
 template <class K> void CompareWithAutomatic(const Sample<K> &s, const DynamicVector &lambda)
 {
   using Automatic = Constraint<K, K::markers, K::rows>;
@@ -302,7 +302,7 @@ template <class K> DynamicVector VelocityValue(const Sample<K> &s)
   return ToVector<K::rows>(psi);
 }
 
-/* dPsi/d twists, frames, inputs */
+/* dPsi/d(twists), dPsi/d(frames), dPsi/d(inputs) */
 template <class K>
 void VelocityGradient(const Sample<K> &s, typename K::Gradient &J, typename K::Gradient &P,
                       Matrix<K::rows, Sample<K>::Z> &Jz)
@@ -323,7 +323,7 @@ template <class K> DynamicVector VelocityLoad(const Sample<K> &s, const DynamicV
   return J.transpose() * lambda;
 }
 
-/* Psi is linear in the twists, Psi(w) = J w + Psi(0), and its reaction J^T lambda needs no inputs */
+/* Psi is affine in the twists, Psi(w) = J w + Psi(0), and its reaction J^T lambda does not depend on the inputs */
 template <class K> void CheckLinear(const Sample<K> &s, const typename K::Gradient &J, const DynamicVector &lambda)
 {
   Sample<K>     rest(s), twice(s), other(s);
@@ -381,7 +381,7 @@ void CheckVelocityConstraint(const Make &make = {}, unsigned seed = 1, double to
 namespace checks
 {
 
-/* forces and moments of all markers below each other */
+/* Forces and moments of all markers in one vector */
 template <int M> DynamicVector ToVector(const Wrench<double> *on)
 {
   DynamicVector x(6 * M);
@@ -399,7 +399,7 @@ template <class K> DynamicVector Load(const Sample<K> &s)
   return ToVector<K::markers>(on);
 }
 
-/* sum of forces and of moments about the space origin */
+/* The sums of forces and of moments about the space origin vanish */
 template <class K> void ExpectBalance(const Sample<K> &s, const DynamicVector &load)
 {
   Vec3<double> force = Vec3<double>::Zero(), moment = Vec3<double>::Zero();
@@ -422,7 +422,7 @@ template <class K> void ExpectActs(const DynamicVector &load)
 
 } // namespace checks
 
-/* balanced: action and reaction are both among the wrenches */
+/* balanced: the wrenches contain both action and reaction */
 template <class K, class Make = checks::Nothing>
 void CheckForce(const Make &make = {}, bool balanced = true, unsigned seed = 1, double tolerance = checks::tolerance)
 {

@@ -1,4 +1,4 @@
-/* Static equilibrium, assembly and kinematics as calls on a run, against closed forms and against runs in time. */
+/* Static equilibrium, assembly and kinematics called on a run, compared with closed forms and with runs in time */
 #include "hhtdae/analyses.h"
 #include "hhtdae/helpers.h"
 #include "hhtdae/linearize.h"
@@ -13,7 +13,7 @@ using namespace hhtdae;
 namespace
 {
 
-/* A TS that goes with the test */
+/* A TS that is destroyed at the end of the test */
 struct OwnTS {
   TS ts = nullptr;
   OwnTS() = default;
@@ -28,7 +28,7 @@ struct OwnTS {
   }
 };
 
-/* A rod of 1 m on a pin at its end, pulled to one side by a force that grows with time, with a torsional spring */
+/* A rod of 1 m with a pin at its end and a torsional spring, pulled to one side by a force that grows with time */
 struct Lever {
   Scene   scene{PETSC_COMM_SELF};
   Body    arm;
@@ -53,7 +53,8 @@ struct Lever {
 
 } // namespace
 
-/* tan(angle) = force over half of the weight; reactions balance the loads; nothing of it moves the scene or other runs */
+/* In equilibrium tan(angle) is the force over half of the weight, and the reactions balance the loads; the analysis
+   changes neither the scene nor other runs */
 TEST(Analyses, QuasiStaticLever)
 {
   Lever    l;
@@ -77,7 +78,7 @@ TEST(Analyses, QuasiStaticLever)
   EXPECT_NEAR(m.position(0), 0, 1e-12);
 }
 
-/* Round and round: the spring's angle is counted on the way, and the run goes on from there at rest */
+/* Equilibria over several turns count the angle of the spring on the way; the run continues from the last one at rest */
 TEST(Analyses, TurnsAreCountedOnTheWay)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -100,7 +101,7 @@ TEST(Analyses, TurnsAreCountedOnTheWay)
   EXPECT_NEAR(run.time(), 40.01, 1e-12);
 }
 
-/* A slow motion may turn what it drives by many turns, over a thread, gears, a rack or a formula */
+/* A slow motion may turn the bodies that it drives through a thread, gears, a rack or a formula by many turns */
 TEST(Analyses, KinematicsOfWhatIsGearedUp)
 {
   const double ratio = .002;
@@ -142,7 +143,7 @@ TEST(Analyses, KinematicsOfWhatIsGearedUp)
   }
 }
 
-/* A stone that nothing holds has no equilibrium */
+/* A free body has no equilibrium; a failed analysis leaves the run unchanged */
 TEST(Analyses, WhatFailsLeavesTheRunWhereItWas)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -166,7 +167,8 @@ TEST(Analyses, WhatFailsLeavesTheRunWhereItWas)
   EXPECT_NEAR(m.acceleration(2), -10, 1e-12) << "accelerations of the start";
 }
 
-/* What motions have moved by then is held still: a wagon that speeds up has a pendulum that hangs straight */
+/* Static equilibrium at t > 0 takes the positions of motions at that time, but no velocities or accelerations: the
+   pendulum on an accelerated wagon hangs straight down */
 TEST(Analyses, MotionsAreHeldStill)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -191,7 +193,8 @@ TEST(Analyses, MotionsAreHeldStill)
   EXPECT_NEAR(l.force(0), 0, 1e-9) << "no force makes anything faster";
 }
 
-/* A base that a motion shakes, with a mass on a spring on it: the run from equilibrium begins with the velocity of the base, by call and by the scene */
+/* A mass on a spring on a base that a motion shakes: a run that begins in equilibrium, by call or by the scene's
+   start, begins with the velocity of the base */
 TEST(Analyses, ARunFromEquilibriumGoesWithItsMotions)
 {
   const double a = 1e-3, w = 7, mass = 2, k = 500, g = 10;
@@ -222,13 +225,13 @@ TEST(Analyses, ARunFromEquilibriumGoesWithItsMotions)
     must(scene.solve(run.ts));
     must(now.take(run.ts));
     must(now.motion(on_top, &x));
-    /* z'' = W^2 (a sin wt - z) about equilibrium, from rest */
+    /* z'' = W^2 (a sin wt - z) about the equilibrium, from rest */
     const double W = std::sqrt(k / mass), t = 2, forced = a * W * W / (W * W - w * w);
     EXPECT_NEAR(x.position(2), 0.5 - mass * g / k + forced * (std::sin(w * t) - w / W * std::sin(W * t)), 2e-5);
   }
 }
 
-/* Answers are those of the state that there is: after it was changed by hand, those of the changed one */
+/* Snapshots show the present state of the TS, also after the user has changed time or state */
 TEST(Analyses, AStateThatWasChangedByHand)
 {
   Lever    l;
@@ -241,19 +244,19 @@ TEST(Analyses, AStateThatWasChangedByHand)
   must(now.take(run.ts));
   must(now.motion(l.tip, &m));
   EXPECT_LT(m.acceleration.norm(), 1e-8);
-  must(TSSetTime(run.ts, 6)); /* a larger push */
+  must(TSSetTime(run.ts, 6)); /* the pulling force is larger at this time */
   must(now.take(run.ts));
   must(now.motion(l.tip, &m));
   const double larger = m.acceleration.norm();
   EXPECT_NEAR(larger, std::sqrt(0.5) / (1. / 3), 1e-6) << "its moment over the inertia";
   must(TSSetTime(run.ts, 5));
-  must(VecShift(U, 0.1)); /* another angle and place, and multipliers that are nobody's */
+  must(VecShift(U, 0.1)); /* other angle and position, and arbitrary multipliers */
   must(now.take(run.ts));
   must(now.motion(l.tip, &m));
   EXPECT_GT(m.acceleration.norm(), 0.1);
 }
 
-/* Linearized about an equilibrium that a call has found: a pendulum held aside by t = 5 under gravity */
+/* Linearization about an equilibrium found by a call: a pendulum under gravity, pulled aside by the force at t = 5 */
 TEST(Analyses, ModesAboutAnEquilibrium)
 {
   Lever l;
@@ -268,7 +271,7 @@ TEST(Analyses, ModesAboutAnEquilibrium)
   EXPECT_NEAR(std::abs(modes[0].value), std::sqrt(3 * (5 * std::sqrt(0.5) + 5 * std::sqrt(0.5))), 1e-6);
 }
 
-/* A mode is of its linearization's unknowns */
+/* A mode can be used only with the linearization that made it */
 TEST(Analyses, ModesOfAnotherLinearization)
 {
   Lever l;
@@ -310,15 +313,15 @@ struct Driven {
     ground_pin      = scene.marker(scene.ground(), linkage.A, z);
     at_rocker       = scene.markerAt(linkage.rocker, linkage.C);
     drive           = scene.add("drive", RotationalMotion{crank_pin, ground_pin, f});
-    scene.start().assembly = Assembly::Project; /* it is described at rest */
+    scene.start().assembly = Assembly::Project; /* the scene describes bodies at rest */
     scene.gravity({0, -9.81, 0});
   }
 };
 
 } // namespace
 
-/* A four-bar through full turns of its crank, in few steps: positions by geometry, velocities and accelerations by differences of them,
-   the moment of the drive by the power of gravity and inertia; a run in time agrees */
+/* A four-bar over full turns of its crank in few steps. Reference of positions: geometry; of velocities and
+   accelerations: differences of positions; of the moment of the drive: a run in time */
 TEST(Analyses, KinematicsOfAFourBar)
 {
   Driven     d(TimeFunction::polynomial({0, 2, 0.3}));
@@ -355,8 +358,10 @@ TEST(Analyses, KinematicsOfAFourBar)
   EXPECT_NEAR(moment[0], moment[1], 1e-4 * std::abs(moment[0]));
 }
 
-/* Units of length do not matter: a crank with its centre of mass off its pin, in steps of 0.9 rad. The first move of Newton's, a straight one, takes it
-   off its pin; in small units that is a much larger number than the sine of the angle was wrong by, and nearer to the solution all the same. */
+/* Results do not depend on the unit of length: a crank with its centre of mass off its pin, in steps of 0.9 rad.
+   Newton's first correction is a straight one and takes the crank off its pin. In small units this constraint
+   violation is a much larger number than the initial error of the sine of the angle, although the state is nearer to
+   the solution */
 TEST(Analyses, KinematicsInAnyUnitsOfLength)
 {
   for (double R : {1e-6, 1e-3, 1., 1e3, 1e6, 1e12}) {
@@ -384,7 +389,7 @@ TEST(Analyses, KinematicsInAnyUnitsOfLength)
   }
 }
 
-/* A state whose rate does not depend on itself */
+/* Kinematics of a scene that contains a pure integrator: a state whose rate does not depend on the state */
 TEST(Analyses, KinematicsBesideIntegrators)
 {
   Scene         s(PETSC_COMM_SELF);
@@ -407,7 +412,8 @@ TEST(Analyses, KinematicsBesideIntegrators)
   }
 }
 
-/* What rounding leaves of velocities that are zero, or small ones, are no measure of how fast a motion becomes; nor are those of other bodies */
+/* Velocities that are zero except for rounding, or small, do not tell how fast a motion will become; nor do velocities
+   of other bodies */
 TEST(Analyses, KinematicsWhereAMotionHasStoodStill)
 {
   for (double first : {0., 1e-4, 3e-4})
@@ -444,7 +450,7 @@ TEST(Analyses, KinematicsWhereAMotionHasStoodStill)
 namespace
 {
 
-/* A body of mass and inertia 1 that a motion drives, on a pin or on a rail */
+/* A body of mass and inertia 1 driven by a motion, on a pin or on a rail */
 struct DrivenBody {
   Scene   scene{PETSC_COMM_SELF};
   Element drive;
@@ -459,7 +465,7 @@ struct DrivenBody {
   }
 };
 
-/* The motion's multiplier at t: the acceleration */
+/* The multiplier of the motion at t, which equals the acceleration */
 double LoadAt(OwnTS &run, const DrivenBody &d, double t)
 {
   Snapshot now;
@@ -472,8 +478,9 @@ double LoadAt(OwnTS &run, const DrivenBody &d, double t)
 
 } // namespace
 
-/* a (1 - cos w t), and a w t - a sin w t, where velocities vanish but for what rounding leaves of them: at the start, there again after other times, and at turning points. Differences
-   over any time that is long enough vanish, and so agree; times near a period do so sooner. */
+/* Motions a (1 - cos w t) and a w t - a sin w t at times where velocities vanish except for rounding: at the start,
+   there again after other times, and at turning points. Differences over sufficiently long times vanish there and seem
+   to agree, over times near a period even earlier */
 TEST(Analyses, KinematicsAtTurningPoints)
 {
   using std::sin;
@@ -493,7 +500,7 @@ TEST(Analyses, KinematicsAtTurningPoints)
   MEASURED("largest error: %.1e", worst);
 }
 
-/* In days what takes a second takes 1e-5, and in microseconds what takes a second 1e6 */
+/* Time scales from 1e-6 to 1e5 of the unit of time, as for motions of seconds described in days or in microseconds */
 TEST(Analyses, KinematicsInAnyUnitsOfTime)
 {
   for (double w : {5e-6, 1e-3, 1., 1e3, 1e6})
@@ -505,7 +512,8 @@ TEST(Analyses, KinematicsInAnyUnitsOfTime)
     }
 }
 
-/* A motion of T seconds that has hardly begun or is nearly over: the velocity is no rounding, and yet says nothing of T, also where it is another time's */
+/* A step of T seconds that has hardly begun or is almost over: the small velocity is not rounding and yet says nothing
+   about T, also where it was left by an analysis at another time */
 TEST(Analyses, KinematicsAfterVelocitiesNearZero)
 {
   Random random(1);
@@ -525,16 +533,16 @@ TEST(Analyses, KinematicsAfterVelocitiesNearZero)
   MEASURED("largest error: %.1e", worst);
 }
 
-/* In units in which the scene is large a sine that cannot get nearer than 1e-4 is no small misfit either */
+/* Also in units in which the scene is large, an error of 1e-4 in an equation of order one means that the assembly has failed */
 TEST(Analyses, AssemblyThatFallsShort)
 {
   Scene     s(PETSC_COMM_SELF);
   const Body   wheel = s.add("wheel", RigidBody{});
   const Marker i = s.marker(wheel), j = s.marker(s.ground());
-  s.marker(wheel, {1e3, 0, 0}); /* its size */
+  s.marker(wheel, {1e3, 0, 0}); /* makes the scene large */
   s.add("pin", Revolute{i, j});
   s.add("sine", UserConstraint{{Expression{{Measure::angle(i, j), Measure::time()}, [](const Real *m) { return sin(m[0]) - 1.0001 * m[1]; }}}});
-  s.start().assembly = Assembly::Project; /* it is described at rest */
+  s.start().assembly = Assembly::Project; /* the scene describes bodies at rest */
   OwnTS run(s);
   must(AssembleAt(run.ts, 0.9));
   ErrorTrap error;
@@ -542,7 +550,7 @@ TEST(Analyses, AssemblyThatFallsShort)
   EXPECT_TRUE(error.says("the scene cannot be assembled at t = 1")) << error.message;
 }
 
-/* Power of the drive = change of kinetic energy + work against gravity, from snapshots alone */
+/* Power of the drive = change of kinetic energy + work against gravity, computed from snapshots only */
 TEST(Analyses, InverseDynamicsByThePower)
 {
   Driven     d(TimeFunction::polynomial({0, 3}));
@@ -582,7 +590,7 @@ TEST(Analyses, WhatIsNotKinematic)
   }
   OwnTS next;
   must(l.scene.createTS(&next.ts, run.ts));
-  must(StaticEquilibrium(next.ts, 1)); /* but one that goes on from it can be moved */
+  must(StaticEquilibrium(next.ts, 1)); /* a run that continues from it can be moved */
   Driven    d(TimeFunction::polynomial({0, 1}));
   Scene     skate(PETSC_COMM_SELF);
   RigidBody b;
@@ -597,7 +605,8 @@ TEST(Analyses, WhatIsNotKinematic)
   EXPECT_TRUE(error.says("of velocities do not say where bodies are")) << error.message;
 }
 
-/* A loop whose row of the time has moved on from where the scene was described; velocities meet its rate */
+/* Assembly at a later time: a constraint that depends on time has moved the loop away from its description; velocities
+   satisfy the rate of the constraint */
 TEST(Analyses, AssemblyAtATime)
 {
   Scene   s(PETSC_COMM_SELF);
@@ -617,7 +626,7 @@ TEST(Analyses, AssemblyAtATime)
   EXPECT_LT((m.velocity - (after - before) / 2e-4).norm(), 1e-7);
 }
 
-/* A row that is no number is none that is met */
+/* A constraint whose residual is NaN is not satisfied */
 TEST(Analyses, AssemblyOfWhatIsNoNumber)
 {
   Scene        s(PETSC_COMM_SELF);
@@ -632,7 +641,7 @@ TEST(Analyses, AssemblyOfWhatIsNoNumber)
   EXPECT_TRUE(error.says("the scene cannot be assembled at t = 2")) << error.message;
 }
 
-/* What an analysis has found is that of the parameters it was made with: functions read the present ones */
+/* An equilibrium belongs to the parameter values with which it was found; functions read the present values */
 TEST(Analyses, AParameterChangesAfterEquilibrium)
 {
   Scene           s(PETSC_COMM_SELF);

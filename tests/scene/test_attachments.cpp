@@ -1,5 +1,6 @@
-/* Attachments of flexible bodies, which have no unknowns: their motion and matrix against differences, their results against a part without mass that a fixed
-   joint holds to the attachment, whose coordinates and multipliers are unknowns. */
+/* Attachments of flexible bodies without unknowns: their motion and matrix are compared with differences, their
+   results with those of a massless part that a fixed joint holds to the attachment and whose coordinates and
+   multipliers are unknowns */
 #include "hhtdae/helpers.h"
 #include "hhtdae/linearize.h"
 #include "hhtdae/query.h"
@@ -31,7 +32,7 @@ FlexibleBody flexible(const ModalCloud &c)
   return b;
 }
 
-/* Two flexible bodies and a rigid one, with elements between their attachments: kinds 0 to 3 */
+/* Two flexible bodies and a rigid one with elements between their attachments; the test uses kinds 0 to 3 */
 struct Tangle {
   Scene scene{PETSC_COMM_WORLD};
 
@@ -117,7 +118,7 @@ TEST(Attachments, JacobianAgainstDifferences)
     }
 }
 
-/* Velocities and accelerations of a frame are derivatives of its pose along a motion of the unknowns */
+/* Velocities and accelerations of an attachment frame are the time derivatives of its pose along a motion of the unknowns */
 TEST(Attachments, MotionAgainstDifferences)
 {
   for (bool stiffens : {false, true}) {
@@ -156,7 +157,8 @@ namespace
 
 enum class Tip { Attachment, Part };
 
-/* Hung at one attachment from a ball joint; at the other a spring and damper, a bushing and a rigid body on a hinge, which a motor drives */
+/* A flexible body suspended at one attachment from a ball joint; at the other attachment there are a spring and
+   damper, a bushing and a rigid body on a hinge with a motor */
 struct Rig {
   Scene                scene{PETSC_COMM_SELF};
   Body                 body, frame;
@@ -202,7 +204,7 @@ struct Rig {
     if (driven) loads.push_back(scene.add("motor", RotationalMotion{end, j, TimeFunction::harmonic(0.5, 3, -M_PI / 2, 0.5)}));
   }
 
-  /* with fixed steps */
+  /* runs with fixed steps */
   PetscInt run(double h, double until, Motion *m, Load *reaction = nullptr, double *energy = nullptr)
   {
     char steps[128];
@@ -240,7 +242,7 @@ struct Rig {
   }
 
 private:
-  /* The attachment's own element hands it on */
+  /* the fixed joint between attachment and part transmits the reaction */
   void tie(Snapshot &now, const Load &reaction)
   {
     const auto &all = DataOf(scene).elements;
@@ -266,8 +268,9 @@ private:
 
 } // namespace
 
-/* The same motion, and the reaction between the part and the attachment is the sum of what elements do to the attachment itself. Velocities of the part meet its
-   joint to second order in the step size, those of the attachment exactly: the difference vanishes with the integrator's error. */
+/* The motion is the same as with a fixed part, and the reaction between part and attachment is the sum of the forces
+   of elements on the attachment. The velocities of the part satisfy its joint to second order in the step size, those
+   of the attachment exactly: the difference vanishes with the integrator's error */
 TEST(Attachments, AsAPartThatIsFixedToIt)
 {
   for (bool stiffens : {false, true}) {
@@ -309,7 +312,7 @@ TEST(Attachments, SecondOrder)
   EXPECT_LT(std::log2(error[0] / error[1]), 2.4);
 }
 
-/* Nothing but springs, gravity and joints: what is lost is the integrator's error */
+/* With springs, gravity and joints only, the loss of energy is the integrator's error */
 TEST(Attachments, EnergyStays)
 {
   double lost[2];
@@ -320,7 +323,8 @@ TEST(Attachments, EnergyStays)
   EXPECT_LT(std::abs(lost[1]), 0.35 * std::abs(lost[0]));
 }
 
-/* Small motions, loads on an attachment and what moves there, through the modes alone and through a part */
+/* Linearization with loads and elements on an attachment: the modal coordinates alone and the variant with a part give
+   the same small motions */
 TEST(Attachments, LinearizedAsAPart)
 {
   std::vector<Mode> modes[2];
@@ -339,7 +343,7 @@ TEST(Attachments, LinearizedAsAPart)
     must(about.modes(&modes[k]));
     must(about.stateSpace({push}, {Measure::displacement(rig.end, 1), Measure::acceleration(rig.end, 0)}, &s[k]));
     must(about.part(modes[k][0], rig.frame, &part[k]));
-    const double size = std::abs(part[k].displacement(0)); /* another unknown may be the largest one */
+    const double size = std::abs(part[k].displacement(0)); /* the component of largest size may belong to another unknown */
     part[k].displacement /= part[k].displacement(0);
     EXPECT_GT(size, 1e-6);
   }
@@ -351,7 +355,7 @@ TEST(Attachments, LinearizedAsAPart)
   EXPECT_NEAR(s[0].D[1], s[1].D[1], 1e-6 * std::abs(s[1].D[1]));
 }
 
-/* From a checkpoint with the same bits; with a description of its own from where another run is, where accelerations are found anew */
+/* A run resumed from a checkpoint has the same bits; a run continued with a new description finds its accelerations again */
 TEST(Attachments, RunsGoOn)
 {
   const TemporaryFile file("attachments.checkpoint");
@@ -386,7 +390,7 @@ TEST(Attachments, RunsGoOn)
   for (std::size_t k = 6; k < 11; k++) EXPECT_NEAR(straight[k], on[k], 1e-4) << "mode " << k - 5;
 }
 
-/* The reaction of an attachment is no unknown, and no argument in equations */
+/* The reaction of an attachment is not an unknown and cannot be an argument of equations; it is for output only */
 TEST(Attachments, ReactionIsForOutputAlone)
 {
   Scene      scene(PETSC_COMM_WORLD);

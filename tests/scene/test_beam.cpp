@@ -1,4 +1,4 @@
-/* The beam: derivatives and energy, the linear element's matrix at rest, and static structures against closed forms */
+/* The beam element: derivatives and energy, its matrix at rest, and static structures against closed forms */
 #include "dense.h"
 #include "force_checks.h"
 #include "scene/kernels/beam.h"
@@ -26,7 +26,7 @@ struct Section {
   }
 };
 
-/* The textbook's 12 x 12 matrix, unknowns (displacement, rotation) of x = 0, then of x = L, in the axes of the beam */
+/* The textbook's 12 x 12 matrix; unknowns are displacement and rotation at x = 0, then at x = L, in the axes of the beam */
 DynamicMatrix Przemieniecki(const Section &s, double L)
 {
   const double  py = s.shear_y > 0 ? 12 * s.E * s.Izz / (s.G * s.shear_y * L * L) : 0;
@@ -50,14 +50,14 @@ DynamicMatrix Przemieniecki(const Section &s, double L)
 struct Cantilever {
   struct Element {
     int                    j, i;
-    Matrix3                Rj, Ri; /* markers on the nodes */
+    Matrix3                Rj, Ri; /* axes of the markers on the nodes */
     BeamForce<false>::Data data;
   };
   std::vector<Frame<double>> node;
   std::vector<Element>       element;
   Vector3                    force = Vector3::Zero(), moment = Vector3::Zero(); /* at the tip, fixed in space */
 
-  /* through these points, bending about the y and z axes of `up` */
+  /* through these points, with bending about the y and z axes of `up` */
   Cantilever(const std::vector<Vector3> &points, const Section &section)
   {
     for (const Vector3 &x : points) node.push_back({x, Matrix3::Identity()});
@@ -78,7 +78,7 @@ struct Cantilever {
   }
   Frame<double> &tip() { return node.back(); }
 
-  /* r = -(loads), K = dr of the free nodes */
+  /* r = -(loads), K = dr/d(free nodes) */
   void assemble(DynamicVector &r, DynamicMatrix &K) const
   {
     const int n = 6 * ((int)node.size() - 1);
@@ -102,8 +102,8 @@ struct Cantilever {
     }
   }
 
-  /* Newton's method; the number of iterations, -1 if it does not converge. Steps are cut where a node would turn far.
-   */
+  /* Newton's method; returns the number of iterations, -1 if it does not converge. Corrections that would turn a node
+     far are shortened */
   int solve(int most = 60)
   {
     DynamicVector r;
@@ -120,13 +120,13 @@ struct Cantilever {
         node[k].x += dx.segment<3>(6 * k - 6);
         node[k].R = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix() * node[k].R;
       }
-      if (dx.norm() < 1e-10) return iteration + 1; /* lengths are up to 100; it converges quadratically */
+      if (dx.norm() < 1e-10) return iteration + 1; /* lengths are up to 100; convergence is quadratic */
     }
     return -1;
   }
 };
 
-/* a slender strip: bending matters alone */
+/* a slender strip, in which only bending matters */
 Section Strip()
 {
   Section s;
@@ -178,7 +178,7 @@ TEST(Beam, Potential)
   ExpectObjective<BeamForce<true>>(BeamData<true>);
 }
 
-/* the stiffness at rest in any orientation, with shear and without, and the damping proportional to it */
+/* the stiffness at rest for any orientation, with and without shear, and the damping proportional to it */
 TEST(Beam, MatrixAtRest)
 {
   Random random(31);
@@ -206,7 +206,7 @@ TEST(Beam, MatrixAtRest)
   }
 }
 
-/* both ends are treated alike: the beam read from its other end makes the same wrenches */
+/* Both ends are treated alike: exchanging the ends of the beam gives the same wrenches */
 TEST(Beam, HasNoPreferredEnd)
 {
   Random        random(32);
@@ -225,7 +225,7 @@ TEST(Beam, HasNoPreferredEnd)
   }
 }
 
-/* free of strain it is free of force wherever it goes, however it moves there */
+/* Without strain there is no force, for any rigid position and velocity */
 TEST(Beam, RigidMotion)
 {
   Random                      random(33);
@@ -338,7 +338,7 @@ TEST(Beam, CurvedCantileverInSpace)
   }
 }
 
-/* Euler's load pi^2 EI/4L^2 of a cantilever: there the matrix of the straight, compressed beam turns singular */
+/* At Euler's load pi^2 EI/4L^2 of a cantilever the matrix of the straight, compressed beam becomes singular */
 TEST(Beam, EulerBuckling)
 {
   const double exact  = M_PI * M_PI / 4;

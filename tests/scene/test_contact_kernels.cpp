@@ -1,4 +1,4 @@
-/* Contact: kernels by differences and by what forces have to do, entries of a scene */
+/* Contact: kernels against differences and physical properties of the forces; entries of a scene */
 #include "contact_cases.h"
 #include "scene/model.h"
 
@@ -20,7 +20,7 @@ TYPED_TEST_SUITE(ContactKernel, Shapes);
 
 TYPED_TEST(ContactKernel, DerivativesMasksBalance) { CheckForce<Contact<TypeParam>>(Touching<TypeParam>); }
 
-/* the chain rule by hand against automatic differentiation of components() and apply(), which force states use */
+/* The hand-written chain rule against automatic differentiation of components() and apply(), which force states use */
 TYPED_TEST(ContactKernel, AgreesWithItsComponents)
 {
   using K = Contact<TypeParam>;
@@ -37,7 +37,7 @@ TYPED_TEST(ContactKernel, AgreesWithItsComponents)
   }
 }
 
-/* normal and contact point belong together */
+/* Normal and contact point are consistent: the rate of penetration is the normal velocity at the contact point */
 TYPED_TEST(ContactKernel, RateOfPenetrationIsTheNormalVelocityAtTheContactPoint)
 {
   Random random(13);
@@ -61,7 +61,7 @@ TYPED_TEST(ContactKernel, UndampedForceHasAPotential)
   }
 }
 
-/* what is not elastic takes energy; N is never negative */
+/* The inelastic part of the force dissipates energy; N is never negative */
 TYPED_TEST(ContactKernel, DampingAndFrictionTakeEnergy)
 {
   Random random(17);
@@ -99,14 +99,14 @@ TYPED_TEST(ContactKernel, NothingBeforeTouching)
   }
 }
 
-/* the force comes up from zero when contact begins, and so does the Jacobian but of the linear law */
+/* When contact begins, the force increases continuously from zero, and so does the Jacobian except for the linear law */
 TYPED_TEST(ContactKernel, BeginsContinuously)
 {
   using K = Contact<TypeParam>;
   Random random(23);
   for (double exponent : {1., 1.5, 2.}) {
     Encounter<TypeParam> s(random);
-    for (Twist<double> &w : s.w) w = {w.v / 20, w.w / 20}; /* not parting so fast that the force is zero */
+    for (Twist<double> &w : s.w) w = {w.v / 20, w.w / 20}; /* slow enough that the normal force does not vanish by separation */
     s.d.law              = MakeLaw(3, exponent, .5, .8, .5);
     const double small[] = {1e-4, 1e-6, 1e-8};
     double       before  = 1e3;
@@ -117,7 +117,7 @@ TYPED_TEST(ContactKernel, BeginsContinuously)
       K::jacobian(s.d, s.f, s.w, 0, nullptr, on, J);
       const double now = J.frames.cwiseAbs().maxCoeff();
       EXPECT_LT(checks::ToVector<2>(on).norm(), 200 * std::pow(depth, exponent));
-      if (exponent > 1) { EXPECT_LT(now, .2 * before); } /* like d^(e-1) at least */
+      if (exponent > 1) { EXPECT_LT(now, .2 * before); } /* at least like d^(e-1) */
       EXPECT_GT(now, 0);
       before = now;
     }
@@ -166,8 +166,8 @@ TEST(ContactEntry, RefusesByName)
   for (const ElementData &e : DataOf(scene).elements) EXPECT_TRUE(e.parts.empty());
 }
 
-/* A ball thrown along the plane without spin ends up rolling at 5/7 of its speed, sunk in to where k d^e is its weight.
-   The forces eliminated and carried as states alike. */
+/* A ball thrown along the plane without spin ends up rolling at 5/7 of its speed, with the penetration at which k d^e
+   is its weight; the same for forces eliminated and as force states */
 TEST(ContactEntry, BallBeginsToRoll)
 {
   const double R = .5, m = 2, g = 9.81, u = 1, mu = .3;
@@ -188,7 +188,7 @@ TEST(ContactEntry, BallBeginsToRoll)
     scene.add("floor", SpherePlane{i, scene.marker(scene.ground()), R, law, state});
     TS ts;
     ASSERT_EQ(scene.createTS(&ts), 0);
-    ASSERT_EQ(TSSetMaxTime(ts, .2), 0); /* slips until 2/7 u/(mu g) = .097 */
+    ASSERT_EQ(TSSetMaxTime(ts, .2), 0); /* it slips until 2/7 u/(mu g) = .097 */
     ASSERT_EQ(TSSetTolerances(ts, 1e-6, nullptr, 1e-6, nullptr), 0);
     ASSERT_EQ(scene.solve(ts), 0);
     Vec                U, V;

@@ -1,4 +1,4 @@
-/* The law of contact by what it promises: smoothness, impact, friction */
+/* Properties of the contact law: smoothness, impact, friction */
 #include "contact_cases.h"
 
 using namespace hhtdae;
@@ -23,7 +23,8 @@ TEST(ContactLaw, ExponentsByTheirShortCuts)
     EXPECT_NEAR(ElasticForce<double>(MakeLaw(2, e, 0, 0, 1), .3), 2 * std::pow(.3, e), 1e-14);
 }
 
-/* parting fast, the force is zero, where Hunt and Crossley's would pull; at rest N = k d^e, damped 1 + c d' */
+/* During fast separation the force is zero, where Hunt and Crossley's law would pull; at rest N = k d^e, with the
+   damping factor 1 + c d' */
 TEST(ContactLaw, DampingFactor)
 {
   const ContactLaw     law = MakeLaw(10, 2, 2, 0, 1);
@@ -54,7 +55,7 @@ TEST(ContactLaw, FrictionLimit)
 namespace
 {
 
-/* A ball of mass 1 and radius 1 on the plane, moving along its normal; returns height above touching and velocity */
+/* A ball of mass 1 and radius 1 on the plane, moving along the normal; returns height above the plane and velocity */
 struct Bounce {
   Contact<SpherePlaneShape>::Data d;
   double                          gravity;
@@ -78,8 +79,8 @@ struct Bounce {
 
 } // namespace
 
-/* Without gravity the law gives v dv/(1 + c d') = -k d^e dd. Its integral, the same on the way in and out, says that
-   v/c - ln(1 + c v)/c^2 is equal at u (in) and -u' (out), whatever k and e. */
+/* Without gravity the law gives v dv/(1 + c d') = -k d^e dd. Its integral is the same for approach and separation,
+   hence v/c - ln(1 + c v)/c^2 is equal at u (approach) and -u' (separation), whatever k and e */
 TEST(ContactLaw, SpeedAfterImpact)
 {
   for (double e : {1., 1.5, 2.}) {
@@ -97,8 +98,8 @@ TEST(ContactLaw, SpeedAfterImpact)
   }
 }
 
-/* Dropped from height 1: undamped, it comes back with the energy it had; damped, each bounce is lower, and the energy
-   with the elastic one never rises. */
+/* Dropped from height 1: without damping the ball comes back with its energy; with damping each bounce is lower, and
+   the energy including the elastic one never increases */
 TEST(ContactLaw, DropAndBounce)
 {
   for (double c : {0., .1}) {

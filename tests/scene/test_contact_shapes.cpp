@@ -1,4 +1,4 @@
-/* Shapes in contact by known values: depth, normal, point */
+/* Shapes in contact, against known penetration, normal and contact point */
 #include "contact_cases.h"
 
 using namespace hhtdae;
@@ -44,8 +44,8 @@ TEST(ContactShapes, EllipsoidOnPlane)
   const auto         t      = TouchAt<EllipsoidPlaneShape>(d, {0, 0, 2}, tilted);
   EXPECT_NEAR(t.depth, reach - 2, 1e-14);
   const Vec3<double> local = tilted.transpose() * (t.p - Vec3<double>(0, 0, 2));
-  EXPECT_NEAR(local(0) * local(0) + local(1) * local(1) / 4 + local(2) * local(2) / 9, 1, 1e-14); /* on the surface */
-  EXPECT_NEAR(t.p(2), 2 - reach, 1e-14);                                                          /* and lowest */
+  EXPECT_NEAR(local(0) * local(0) + local(1) * local(1) / 4 + local(2) * local(2) / 9, 1, 1e-14); /* the point is on the surface */
+  EXPECT_NEAR(t.p(2), 2 - reach, 1e-14);                                                          /* and is the lowest point */
 }
 
 TEST(ContactShapes, EllipsoidWithEqualSemiaxesIsASphere)
@@ -81,7 +81,7 @@ TEST(ContactShapes, TorusOnPlane)
   }
 }
 
-/* flat: the middle of the ring; differentiable through it */
+/* The torus lies flat: the contact point is the middle of the ring, and the force is differentiable through this position */
 TEST(ContactShapes, TorusLyingFlat)
 {
   const TorusPlaneShape::Data d{2, .5};
@@ -125,7 +125,7 @@ TEST(ContactShapes, SphereOnSphere)
   EXPECT_EQ(inside.n.norm(), 0);
 }
 
-/* exchanged spheres exchange their wrenches */
+/* Exchanging the spheres exchanges their wrenches */
 TEST(ContactShapes, SpheresExchanged)
 {
   Random random(37);
@@ -156,17 +156,17 @@ TEST(ContactShapes, SphereOnBox)
   ExpectTouch(TouchAt<SphereBoxShape>(d, {1.5, .3, -3.5}), 1 - r2, {r2, 0, -r2}, {1.5 - r2, .3, -3.5 + r2});
   ExpectTouch(TouchAt<SphereBoxShape>(d, {-1.5, 2.5, 3.5}), 1 - .5 / r3, {-r3, r3, r3},
               {-1.5 + r3, 2.5 - r3, 3.5 - r3});
-  /* centre inside, nearest the face x = 1; on the face; on the very corner */
+  /* centre inside the box, nearest to the face x = 1; on the face; exactly on the corner */
   ExpectTouch(TouchAt<SphereBoxShape>(d, {.9, 1, 2}), 1.1, {1, 0, 0}, {-.1, 1, 2});
   ExpectTouch(TouchAt<SphereBoxShape>(d, {1, 1, 2}), 1, {1, 0, 0}, {0, 1, 2});
   EXPECT_NEAR(TouchAt<SphereBoxShape>(d, {1, 2, 3}).n.norm(), 1, 1e-14);
   EXPECT_NEAR(TouchAt<SphereBoxShape>(d, {1 + 3e-16, 2 + 5e-16, 3}).n.norm(), 1, 1e-14);
-  /* a box without end along z, as planar scenes have it */
+  /* a box that is infinite along z, as in planar scenes */
   ExpectTouch(TouchAt<SphereBoxShape>({1, {1, 2, std::numeric_limits<double>::infinity()}}, {.9, 1, 0}), 1.1, {1, 0, 0},
               {-.1, 1, 0});
 }
 
-/* depth and normal go over continuously from face to edge to corner, and through a face */
+/* Depth and normal are continuous from face to edge to corner, and through a face */
 TEST(ContactShapes, SphereOnBoxIsContinuous)
 {
   const SphereBoxShape::Data d{1, {1, 2, 3}};
@@ -181,7 +181,7 @@ TEST(ContactShapes, SphereOnBoxIsContinuous)
     }
 }
 
-/* a centre inside the box: away from where two faces are equally near, the derivatives are right as well */
+/* With the centre inside the box, away from points equally near to two faces, the derivatives are also right */
 TEST(ContactShapes, SphereInsideBox)
 {
   CheckForce<Contact<SphereBoxShape>>([](Random &random, Frame<double> *f) {

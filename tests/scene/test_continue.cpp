@@ -1,4 +1,4 @@
-/* Runs that go on where another one is: joints that let go or take hold, other parameters, the same scene. */
+/* Runs that continue from the state of another run: joints that are released or engaged, other parameters, or the same scene */
 #include "hhtdae/query.h"
 #include "scene_output.h"
 #include <cmath>
@@ -8,7 +8,7 @@ using namespace hhtest;
 namespace
 {
 
-/* A bar that swings on a pin, which may be open, and may be caught by a vertical line that holds its centre */
+/* A bar that swings on a pin, which may be released, and whose centre may be held on a vertical line */
 struct Swing {
   Scene     scene{PETSC_COMM_SELF};
   Parameter held, caught, line;
@@ -56,8 +56,9 @@ TS goOn(Scene &scene, TS from, double end)
 
 } // namespace
 
-/* A pendulum in 25 runs that go on from one another, with and without a parameter in the scene: the pin's reaction at their ends, in closed form. The state at the end of a step
-   meets constraints no more nearly than the tolerance wants, and that is no reason to refuse it, nor to take its velocities as they are. */
+/* A pendulum in 25 runs, each continued from the one before, with and without a parameter in the scene; the pin's
+   reactions at their ends against the closed form. The state at the end of a step satisfies the constraints only to
+   the tolerance: it must not be refused, but its velocities must be projected */
 TEST(Continue, ChainOfRuns)
 {
   for (const double eps : {1e-3, 1e-4, 1e-5})
@@ -96,7 +97,7 @@ TEST(Continue, ChainOfRuns)
     }
 }
 
-/* The pin opens at the bottom: the centre flies off along a parabola, the bar turns on */
+/* The pin is released at the bottom: the centre moves along a parabola, and the bar keeps its angular velocity */
 TEST(Continue, AJointLetsGo)
 {
   Swing    s;
@@ -116,7 +117,7 @@ TEST(Continue, AJointLetsGo)
   must(TSDestroy(&ts));
 }
 
-/* And is caught by a guide: a plastic impact, the velocity across is lost and nothing else */
+/* The bar is caught by a guide: a plastic impact, in which only the velocity across the guide is lost */
 TEST(Continue, AJointTakesHold)
 {
   Swing    s;
@@ -127,19 +128,19 @@ TEST(Continue, AJointTakesHold)
   must(s.scene.set("caught", 1));
   ErrorTrap trap;
   TS        ts;
-  must(s.scene.set("line", x.position(0) + 0.01)); /* not where the bar is */
+  must(s.scene.set("line", x.position(0) + 0.01)); /* the line is not where the bar is */
   EXPECT_NE(s.scene.createTS(&ts, run.ts), 0);
   EXPECT_TRUE(trap.says("in-line guide: not met by 0.01")) << trap.message;
   must(s.scene.set("line", x.position(0)));
   must(s.scene.createTS(&ts, run.ts));
   const Motion y = of(ts, s.centre);
-  EXPECT_NEAR(y.velocity(0), 0, 1e-9); /* across the line */
+  EXPECT_NEAR(y.velocity(0), 0, 1e-9); /* the velocity across the line */
   EXPECT_NEAR(y.velocity(1), x.velocity(1), 1e-9);
   EXPECT_LT((y.angular_velocity - x.angular_velocity).norm(), 1e-9);
   must(TSDestroy(&ts));
 }
 
-/* What hangs on a link without mass keeps its momenta: two free bodies that dock by it */
+/* Two free bodies dock by a massless link, in an impact that conserves their momenta */
 TEST(Continue, ImpactOfALinkWithoutMass)
 {
   Scene           s(PETSC_COMM_SELF);
@@ -182,7 +183,8 @@ TEST(Continue, ImpactOfALinkWithoutMass)
   must(TSDestroy(&ts));
 }
 
-/* Rows of a user's that count no angles may come and go, too: a guide of expressions, of positions and of velocities */
+/* A user constraint that counts no angles may be added or removed, too: a guide by expressions, on position level and
+   on velocity level */
 TEST(Continue, AUserConstraintTakesHold)
 {
   for (bool velocities : {false, true}) {
@@ -205,7 +207,7 @@ TEST(Continue, AUserConstraintTakesHold)
     const Motion caught = of(ts, s.centre);
     EXPECT_NEAR(caught.position(0), x.position(0), 1e-7);
     EXPECT_NEAR(caught.velocity(0), 0, 1e-7);
-    must(s.scene.set("caught", 0)); /* and lets go */
+    must(s.scene.set("caught", 0)); /* and is removed */
     TS next = goOn(s.scene, ts, 0.6);
     EXPECT_LT((of(next, s.centre).velocity - caught.velocity - Vector3(0, -0.981, 0)).norm(), 1e-6);
     must(TSDestroy(&next));
@@ -213,7 +215,7 @@ TEST(Continue, AUserConstraintTakesHold)
   }
 }
 
-/* A run that goes on with nothing changed is the same motion, counted angles included */
+/* A run continued without changes has the same motion, including counted angles */
 TEST(Continue, NothingChanged)
 {
   for (bool with_parameters : {false, true}) {
@@ -243,7 +245,7 @@ TEST(Continue, NothingChanged)
   }
 }
 
-/* Where joints have turned by more than half a turn before a scene with parameters is described anew */
+/* Joints have turned by more than half a turn before a scene with parameters is described again */
 TEST(Continue, TurnsOfGearsAndScrewsGoOn)
 {
   for (Assembly assembly : {Assembly::Report, Assembly::Project}) {
@@ -279,7 +281,8 @@ TEST(Continue, TurnsOfGearsAndScrewsGoOn)
   }
 }
 
-/* Load that shifts in a body: what has been seen of the body stays where it is and as fast as it is, and the body turns about its new centre of mass */
+/* The centre of mass of a body shifts: the body frame keeps its position and velocity, and the body then rotates about
+   its new centre of mass */
 TEST(Continue, AnotherCentreOfMass)
 {
   Scene           s(PETSC_COMM_SELF);
@@ -304,7 +307,7 @@ TEST(Continue, AnotherCentreOfMass)
   EXPECT_LT((after.velocity - before.velocity).norm(), 1e-14);
   must(TSDestroy(&ts));
   ts = goOn(s, half.ts, 1.7);
-  /* about the centre, which goes on with the velocity that its place in the body had */
+  /* about the centre of mass, which moves on with the velocity of its point of the body */
   const double  angle = 2 * 0.7;
   const Vector3 arm = 0.4 * Vector3(std::cos(angle), std::sin(angle), 0), centre = Vector3(1 + 0.5 * 0.7, 2, 3) + arm;
   const Vector3 speed = Vector3(0.5, 0, 0) + Vector3(0, 0, 2).cross(arm);
@@ -313,7 +316,7 @@ TEST(Continue, AnotherCentreOfMass)
   must(TSDestroy(&ts));
 }
 
-/* Nor does it change what a run from the start is, whether the run that goes on can be made or not */
+/* Continuing a run does not change what a run from the start is, whether the continued run can be made or not */
 TEST(Continue, TheStartStaysTheStart)
 {
   Swing    s;
@@ -331,7 +334,7 @@ TEST(Continue, TheStartStaysTheStart)
     EXPECT_EQ(begin, 0);
     must(again.solve());
     EXPECT_EQ(of(again.ts, s.centre).position, first.position);
-    must(s.scene.set("caught", 1)); /* by a line through somewhere else: refused */
+    must(s.scene.set("caught", 1)); /* refused, because the line is elsewhere */
     ErrorTrap trap;
     EXPECT_NE(s.scene.createTS(&ts, run.ts), 0);
     must(s.scene.set("caught", 0));
@@ -348,7 +351,8 @@ TEST(Continue, SaysWhatCannotBe)
   EXPECT_TRUE(trap.says("the TS is not of this scene")) << trap.message;
 }
 
-/* What is asked of a run before its first step is what was true at the end of the one that it goes on from: attitudes count from another reference */
+/* A snapshot of a continued run before its first step equals that at the end of the previous run, although rotation
+   vectors count from another reference attitude */
 TEST(Continue, SnapshotsBeforeTheFirstStep)
 {
   Scene     scene(PETSC_COMM_SELF);
@@ -390,7 +394,8 @@ TEST(Continue, SnapshotsBeforeTheFirstStep)
   must(TSDestroy(&next));
 }
 
-/* Of two stops that count full turns one goes and the other one comes, of the same kernel and so of as many numbers */
+/* One stop that counts full turns is removed and another one is added, with the same kernel and therefore the same
+   number of stored values; it must not inherit the turns */
 TEST(Continue, AStopDoesNotTakeTheTurnsOfAnother)
 {
   Scene      s(PETSC_COMM_SELF);
@@ -412,7 +417,7 @@ TEST(Continue, AStopDoesNotTakeTheTurnsOfAnother)
   EXPECT_TRUE(trap.says("have come or gone that count angles over full turns or follow a curve, as rotational stop first stop has")) << trap.message;
 }
 
-/* A spring that counts full turns gets a damper, for which its force is another kernel's */
+/* A spring that counts full turns gets a damper, which changes the kernel of its force; the turns are kept */
 TEST(Continue, ASpringGetsADamper)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -446,7 +451,7 @@ TEST(Continue, ASpringGetsADamper)
   must(TSDestroy(&ts));
 }
 
-/* A description that cannot be built, or is not where the run is, is no fault of the run */
+/* A description that cannot be built, or does not fit the state of the run, leaves the run intact */
 TEST(Continue, ARunOutlivesAFailedDescription)
 {
   Swing s;
@@ -467,7 +472,7 @@ TEST(Continue, ARunOutlivesAFailedDescription)
   must(s.scene.sample(run.ts, 0.4, x));
 }
 
-/* An exception of the user's function is an error, and the run is where it was */
+/* An exception of the user's function becomes an error, and the run stays where it was */
 TEST(Continue, ADescriptionThatThrows)
 {
   Scene      s(PETSC_COMM_SELF);
@@ -490,7 +495,7 @@ TEST(Continue, ADescriptionThatThrows)
   must(run.solve());
 }
 
-/* What comes while the scene runs is refused and changes nothing of the run */
+/* Additions to the scene while it runs are refused and change nothing in the run */
 TEST(Continue, GravityThatComesTooLate)
 {
   Scene        s(PETSC_COMM_SELF);

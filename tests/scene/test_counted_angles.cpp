@@ -1,4 +1,4 @@
-/* Angles over full turns in questions to a run, in PETSc's events, in kinematics and in runs that go on from others. */
+/* Angles that count full turns: in snapshots, in PETSc's events, in kinematics and in continued runs */
 #include "hhtdae/helpers.h"
 #include "hhtdae/analyses.h"
 #include "hhtdae/query.h"
@@ -51,7 +51,8 @@ double angleOf(TS ts, Marker i, Marker j)
 
 } // namespace
 
-/* Asked for when all is over: the motion, the spring, a channel, in the plane the body itself know the turns */
+/* The angle is asked for after the run only. The turns are known from whatever counts them: the motion, the spring, a
+   channel, a variable, or in a planar scene the body itself */
 TEST(CountedAngles, AfterTheRunByWhatCounts)
 {
   const double end = 5.3;
@@ -67,7 +68,7 @@ TEST(CountedAngles, AfterTheRunByWhatCounts)
   }
 }
 
-/* Half a turn is +pi, in whatever axes: a spring that is free there pulls at nothing, and a stop stays open */
+/* Half a turn is +pi for any axes: a spring with this free angle has no moment, and a stop stays open */
 TEST(CountedAngles, HalfATurnAtTheStart)
 {
   for (Space space : {Space::Spatial, Space::Planar})
@@ -91,7 +92,7 @@ TEST(CountedAngles, HalfATurnAtTheStart)
     }
 }
 
-/* Nothing else counts: from the first question on */
+/* If nothing else counts turns, they are counted from the first question on */
 TEST(CountedAngles, FromTheFirstQuestion)
 {
   Wheel    w(turn);
@@ -105,7 +106,7 @@ TEST(CountedAngles, FromTheFirstQuestion)
   must(TSGetPrevTime(run.ts, &before));
   EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 2.3 * turn, 1e-6);
   EXPECT_NEAR(angleAt(run.ts, (before + 2.3) / 2, w.i, w.j), (before + 2.3) / 2 * turn, 1e-6);
-  EXPECT_NEAR(angleOf(run.ts, w.j, w.i), -0.3 * turn, 1e-6); /* the other way round is another angle */
+  EXPECT_NEAR(angleOf(run.ts, w.j, w.i), -0.3 * turn, 1e-6); /* the angle of j relative to i is counted separately */
   must(TSSetMaxTime(run.ts, 7.2));
   must(run.solve());
   EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 7.2 * turn, 1e-6);
@@ -114,7 +115,7 @@ TEST(CountedAngles, FromTheFirstQuestion)
   EXPECT_NEAR(x, 2.3 * turn, 1e-6);
 }
 
-/* What was taken before the run went on is what it was, and so is what elements remembered then */
+/* A snapshot keeps its values when the run continues, including the turns counted by elements at that time */
 TEST(CountedAngles, OldSnapshots)
 {
   Wheel         w(turn);
@@ -145,13 +146,13 @@ TEST(CountedAngles, OldSnapshots)
   EXPECT_EQ(potential[1], potential[0]);
   must(old.value(Measure::angle(w.i, w.j), &angle));
   EXPECT_NEAR(angle, 0.4 * turn, 1e-2);
-  must(now.load(spring, w.i, &later)); /* the run has kept what it remembers */
+  must(now.load(spring, w.i, &later)); /* the run itself keeps its counts */
   must(now.value(Measure::angle(w.i, w.j), &angle));
   EXPECT_GT(angle, turn);
   EXPECT_NEAR(later.moment.norm(), 1e-3 * angle, 1e-12);
 }
 
-/* In the plane steps may turn bodies further than half a turn */
+/* In planar scenes a step may turn bodies by more than half a turn */
 TEST(CountedAngles, InThePlaneWhateverTheStep)
 {
   Wheel    w(40 * turn, Space::Planar);
@@ -160,7 +161,7 @@ TEST(CountedAngles, InThePlaneWhateverTheStep)
   EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 52 * turn, 1e-6);
 }
 
-/* TSSetEventHandler() ends the run after five turns, not where the angle is zero again for the first time */
+/* An event of TSSetEventHandler() ends the run after five turns, not where the angle is zero again for the first time */
 TEST(CountedAngles, InEvents)
 {
   Wheel    w(1);
@@ -190,7 +191,7 @@ TEST(CountedAngles, InEvents)
   EXPECT_NEAR(event.at, 5 * turn, 1e-5);
 }
 
-/* One call over many turns: the wheel of the gear is where they bring it */
+/* One call of Kinematics() over many turns: the wheel driven by the gear is at the right angle */
 TEST(CountedAngles, KinematicsOverManyTurns)
 {
   for (Space space : {Space::Spatial, Space::Planar}) {
@@ -215,12 +216,12 @@ TEST(CountedAngles, KinematicsOverManyTurns)
   }
 }
 
-/* To a run that goes on, with the same model or with other parameters */
+/* The count is taken over by a continued run, with the same model or with other parameters */
 TEST(CountedAngles, GoOnWithTheRun)
 {
   for (int how = 0; how < 3; how++)
     for (bool parameters : {false, true}) {
-      const bool      planar = how > 0, asked = how < 2; /* nothing counts in space before somebody asks */
+      const bool      planar = how > 0, asked = how < 2; /* in space nothing counts turns before the first question */
       Scene           scene(PETSC_COMM_SELF, planar ? Space::Planar : Space::Spatial);
       const Parameter mass = parameters ? scene.parameter("mass", 1) : Parameter();
       RigidBody       b;
@@ -241,7 +242,8 @@ TEST(CountedAngles, GoOnWithTheRun)
     }
 }
 
-/* Channels and springs begin in (-pi, pi], as their headers say, and so does a question, whatever turns the motion has begun with */
+/* Channels and springs begin in (-pi, pi], as their headers say, and so does an angle that is asked for, even if the
+   motion begins beyond half a turn */
 TEST(CountedAngles, MotionsThatBeginBeyondHalfATurn)
 {
   for (int how = 0; how < 3; how++)
@@ -262,7 +264,8 @@ TEST(CountedAngles, MotionsThatBeginBeyondHalfATurn)
     }
 }
 
-/* Assembly and equilibrium may move a body over half a turn before the run begins: all who read the angle count on from how it is described */
+/* Assembly and equilibrium may turn a body by more than half a turn before the run begins; all users of the angle
+   count on from the described position */
 TEST(CountedAngles, StartsThatPassHalfATurn)
 {
   for (Space space : {Space::Planar, Space::Spatial})
@@ -293,7 +296,8 @@ TEST(CountedAngles, StartsThatPassHalfATurn)
     }
 }
 
-/* A wheel that swings by ten radians to either side on a spring, under a type of PETSc's own; the square of its angular velocity by Euler's angles */
+/* A wheel that oscillates by ten radians on a spring, under a TS type of PETSc; the square of its angular velocity
+   from Euler angles */
 TEST(CountedAngles, UnderOtherTypes)
 {
   for (const bool planar : {true, false}) {
@@ -314,7 +318,7 @@ TEST(CountedAngles, UnderOtherTypes)
   }
 }
 
-/* By a row of the user's own, whose cam tells how far the wheel has turned */
+/* In a user constraint: the displacement of a cam follower shows how far the wheel has turned */
 TEST(CountedAngles, InUserConstraints)
 {
   Wheel        w(9);
@@ -333,7 +337,7 @@ TEST(CountedAngles, InUserConstraints)
   EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 100 * m.position(2), 1e-5);
 }
 
-/* Driven, and asked for first in a run that goes on from one that goes on */
+/* The angle of a motion is first asked for in a run that continues from a continued run */
 TEST(CountedAngles, OfMotionsAfterRunsThatWentOn)
 {
   Wheel w(0, Space::Spatial, true);
