@@ -1,4 +1,4 @@
-/* Screw, gear, rack and pinion, couplers of three: derivatives, full turns, transmission of motion and load */
+/* Screw, gear, rack and pinion, couplers of three joints: derivatives, full turns, transmission of motion and load */
 #include "kernel_checks.h"
 #include "scene/kernels/coupler.h"
 
@@ -7,7 +7,7 @@ using namespace hhtdae;
 namespace
 {
 
-/* a random instance at a random state, whose memory is somewhere else than at the principal angle */
+/* A random instance at a random state, whose counted angle is some turns away from the principal angle */
 template <class K> typename K::Data Begin(Random &random, Frame<double> *f, typename K::Data d)
 {
   for (int k = 0; k < K::markers; k += 2)
@@ -62,8 +62,8 @@ TEST(CouplerKernels, DerivativesOfTheScrew)
   });
 }
 
-/* Two wheels through many turns: in steps of less than half a turn with accept(), the row stays met; a wrong ratio does
- * not. */
+/* Two wheels over many turns: if each step is below half a turn and ends with accept(), the constraint stays
+   satisfied; for a wrong ratio it does not */
 TEST(CouplerKernels, GearTransmitsManyTurns)
 {
   using Gear = CouplerRow<2, 2>;
@@ -94,7 +94,7 @@ TEST(CouplerKernels, GearTransmitsManyTurns)
   EXPECT_NEAR(Row<Gear>(d, f), -ratio * .01, 1e-12);
 }
 
-/* value() never changes the memory: a rejected step that went far leaves no trace */
+/* value() does not change the counted angle: a rejected step leaves no trace, however far it went */
 TEST(CouplerKernels, OnlyAcceptedStepsAreRemembered)
 {
   using Gear = CouplerRow<2, 2>;
@@ -105,11 +105,11 @@ TEST(CouplerKernels, OnlyAcceptedStepsAreRemembered)
   d.factor[0] = 1;
   Gear::begin(d, f);
   f[0] = Turned(j, 3.5);
-  for (int k = 0; k < 3; k++) EXPECT_NEAR(Row<Gear>(d, f), -.5, 1e-14); /* beyond pi, not wrapped */
+  for (int k = 0; k < 3; k++) EXPECT_NEAR(Row<Gear>(d, f), -.5, 1e-14); /* beyond pi without a jump */
   EXPECT_NEAR(d.memory[0], 3, 1e-14);
 }
 
-/* x = r phi, and the load: a unit multiplier pushes the rack with one and turns the pinion's body with -r about z */
+/* x = r phi; a unit multiplier pushes the rack with a unit force and turns the pinion's body with the moment -r about z */
 TEST(CouplerKernels, RackAndPinion)
 {
   using Rack = CouplerRow<2, 1>;
@@ -136,8 +136,8 @@ TEST(CouplerKernels, RackAndPinion)
   EXPECT_EQ(J.segment<3>(0).norm(), 0);
 }
 
-/* A screw advances by its pitch in each turn; its multiplier is the axial force on i's body, beside -pitch/(2 pi) times
- * that as moment */
+/* A screw advances by its pitch in each turn; its multiplier is the axial force on i's body, together with the moment
+   -pitch/(2 pi) times the multiplier */
 TEST(CouplerKernels, ScrewAdvancesByItsPitch)
 {
   Random              random(9);
@@ -157,7 +157,7 @@ TEST(CouplerKernels, ScrewAdvancesByItsPitch)
   EXPECT_NEAR((-J.segment<3>(3).transpose() + .05 / kTurn * j.R.col(2)).norm(), 0, 1e-14);
 }
 
-/* No load where bodies move together: a common rigid motion of all markers leaves every row unchanged */
+/* A common rigid motion of all markers leaves every constraint unchanged, so that it is not loaded */
 TEST(CouplerKernels, CommonMotionIsFree)
 {
   Random random(10);

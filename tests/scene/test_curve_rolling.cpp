@@ -11,7 +11,7 @@ using namespace hhtdae;
 namespace
 {
 
-/* a disc or sphere on either side, not lying flat */
+/* a disc or a sphere on either side of the plane, not lying flat */
 RollingData RandomRolling(Random &random, Frame<double> *f)
 {
   const double side = random(-1, 1) < 0 ? -1 : 1;
@@ -37,7 +37,7 @@ namespace
 
 constexpr double kNone = 0;
 
-/* a disc or sphere of radius r on the xy plane of the ground, its axes R, rolling at w and moving at v */
+/* A disc or sphere of radius r with the axes R on the xy plane of the ground, with angular velocity w and velocity v */
 struct OnGround {
   Frame<double> f[2];
   Twist<double> w[2];
@@ -53,7 +53,7 @@ Mat3<double> About(const Vec3<double> &axis, double angle) { return Eigen::Angle
 
 } // namespace
 
-/* Upright, axis along y: v_x = r w_y. Leaning by b: height r cos b. */
+/* An upright disc with its axis along y: v_x = r w_y. A disc that leans by b: its centre has the height r cos b */
 TEST(Rolling, DiscOnTheGround)
 {
   const double       r = .7, lean = .3;
@@ -76,8 +76,8 @@ TEST(Rolling, DiscOnTheGround)
   EXPECT_NEAR(phi, 0, 1e-15);
 }
 
-/* Steady turning: the lowest point of a leaning disc goes round a circle of radius R on the ground. Without slip the
-   disc's spin about its axis is rate R / r beside the turning of its plane with the rate about the vertical. */
+/* Steady turning: the lowest point of a leaning disc moves on a circle of radius R on the ground. Without slip the
+   disc's spin about its axis is rate R / r, in addition to the turning of its plane with the rate about the vertical */
 TEST(Rolling, DiscInACircle)
 {
   const double       r = .4, lean = .5, rate = 1.3, R = 2;
@@ -122,7 +122,7 @@ TEST(Rolling, ReactionsActAtThePointOfContact)
   }
 }
 
-/* A ball rolls on a plane that is itself moving and turning: contact velocities agree */
+/* A ball rolls on a plane that itself moves and turns: both have the same velocity at the contact point */
 TEST(Rolling, SphereOnAMovingPlane)
 {
   Random             random(5);
@@ -145,8 +145,8 @@ TEST(Rolling, SphereOnAMovingPlane)
   EXPECT_NEAR(psi[1], -.2, 1e-14);
 }
 
-/* A wheel in a planar scene rolls to the right by turning clockwise above the x axis of j, below it the other way round
- */
+/* A wheel in a planar scene above the x axis of j rolls to the right by turning clockwise; below the axis it turns the
+   other way */
 TEST(Rolling, WheelInThePlane)
 {
   for (double side : {1., -1.}) {
@@ -180,7 +180,7 @@ namespace
 
 using Points = std::vector<Vec3<double>>;
 
-/* a knotted loop */
+/* a knotted closed curve */
 Vec3<double> Trefoil(double a)
 {
   return {std::sin(a) + 2 * std::sin(2 * a), std::cos(a) - 2 * std::cos(2 * a), -std::sin(3 * a)};
@@ -205,7 +205,7 @@ Point At(const Curve &curve, double s)
   return p;
 }
 
-/* a marker near the curve of j, off the knots, and a remembered parameter not far away */
+/* a marker near the curve of j, away from its spline knots, with a remembered parameter nearby */
 template <int R>
 typename OnCurve<R>::Data NearCurve(std::shared_ptr<const Curve> curve, Random &random, Frame<double> *f)
 {
@@ -265,8 +265,7 @@ TEST(Curve, NormalsAreOrthonormal)
   }
 }
 
-/* A circle through 60 points: fourth order in their distance. A closed curve comes back to itself, however far one
- * goes. */
+/* A circle through 60 points: the error is of fourth order in their distance. A closed curve is periodic in its parameter */
 TEST(Curve, Circle)
 {
   double radial[2];
@@ -312,7 +311,7 @@ TEST(Curve, ClosestPoint)
   }
 }
 
-/* A diverged iteration asks for the point closest to nowhere */
+/* A diverged iteration may ask for the curve point closest to NaN or infinity; the search must end */
 TEST(Curve, ClosestPointToNowhereEnds)
 {
   const Curve  curve(OpenPoints(), false, false);
@@ -321,7 +320,7 @@ TEST(Curve, ClosestPointToNowhereEnds)
   EXPECT_EQ(curve.closest(Vec3<double>(0, infinity, 0), .3), .3);
 }
 
-/* On the curve the force of the two multipliers is along the normals, and its rows vanish. */
+/* On the curve the constraint rows vanish, and the force of the two multipliers is normal to the curve */
 TEST(Curve, MultipliersAreNormalForces)
 {
   const auto curve = std::make_shared<const Curve>(TrefoilPoints(24), true, false);
@@ -343,7 +342,7 @@ TEST(Curve, MultipliersAreNormalForces)
   }
 }
 
-/* Going round and round a closed curve in steps, the remembered parameter follows and stays within one round. */
+/* Along many rounds of a closed curve the remembered parameter follows and stays within one period */
 TEST(Curve, RemembersWhereItIs)
 {
   const auto       curve  = std::make_shared<const Curve>(TrefoilPoints(24), true, false);

@@ -1,4 +1,5 @@
-/* Constraints that are redundant at the start and are left out: an error where they are not met later, none where they are. */
+/* Constraints that are redundant at the start are dropped; if they are violated later the run ends with an error,
+   otherwise not */
 #include "hhtdae/analyses.h"
 #include "hhtdae/joints.h"
 #include "scene/model.h"
@@ -21,7 +22,7 @@ std::string failure(Scene &s, double end, const std::string &options = "")
   return trap.message;
 }
 
-/* A wheel that two motions drive: together until t = 0.5 */
+/* A wheel driven by two motions that agree until t = 0.5 */
 void twoMotions(Scene &s, MotionOf of)
 {
   RigidBody b;
@@ -41,7 +42,8 @@ void twoMotions(Scene &s, MotionOf of)
 
 } // namespace
 
-/* A planar four-bar of revolute joints in space: three rows are redundant over all turns, also where the tolerance is loose */
+/* A planar four-bar of revolute joints in space: three redundant rows are satisfied over full turns, also with loose
+   tolerances */
 TEST(DroppedRows, ALinkageOverFullTurns)
 {
   for (double tol : {1e-2, 1e-3, 1e-6}) {
@@ -68,7 +70,7 @@ TEST(DroppedRows, ANetAndBricardsMechanism)
   }
 }
 
-/* Judged by the tolerances of the user's own vectors, too */
+/* The violation is judged by the user's vectors of tolerances, too */
 TEST(DroppedRows, LooseTolerancesByVectors)
 {
   Scene   s(PETSC_COMM_SELF);
@@ -97,8 +99,8 @@ TEST(DroppedRows, MotionsThatPart)
   }
 }
 
-/* A coupler on three cranks, the first of them driven: with bars of one length the third follows, with another length it is locked, which
-   only the dropped row tells, since nothing is left that could move */
+/* A coupler on three cranks, the first of them driven. With cranks of equal length the third one follows; with another
+   length the mechanism is locked. Only the dropped row shows this, because it would remove the last degree of freedom */
 TEST(DroppedRows, AThirdCrankOfAnotherLength)
 {
   for (double length : {1., 1.2}) {
@@ -120,7 +122,7 @@ TEST(DroppedRows, AThirdCrankOfAnotherLength)
   }
 }
 
-/* The end of the last step counts, and so does kinematics */
+/* The violation is noticed at the end of the last step as well, and in kinematics and static equilibrium */
 TEST(DroppedRows, InTheLastStepAndInKinematics)
 {
   Scene s(PETSC_COMM_SELF), k(PETSC_COMM_SELF);
@@ -145,7 +147,7 @@ TEST(DroppedRows, InTheLastStepAndInKinematics)
   EXPECT_EQ(t, 0.3);
 }
 
-/* Two hinges of a door on one line: friction of the one whose rows are left out finds no load, which is said */
+/* Two hinges of a door on one line: friction in the hinge whose rows are dropped has no load, which a message reports */
 TEST(DroppedRows, FrictionThatReadsThem)
 {
   for (int k = 0; k < 2; k++) {
@@ -164,14 +166,14 @@ TEST(DroppedRows, FrictionThatReadsThem)
   }
 }
 
-/* A set-up that fails for want of an equilibrium, and the next one without it */
+/* A set-up that fails because there is no equilibrium, followed by a set-up without equilibrium */
 TEST(DroppedRows, AfterASetUpThatFailed)
 {
   Scene     s(PETSC_COMM_SELF);
   RigidBody b;
   b.position = {5, 0, 0};
   twoMotions(s, MotionOf::Displacement);
-  s.add("free", b); /* falls */
+  s.add("free", b); /* this body falls */
   s.gravity({0, 0, -9.81});
   s.start().equilibrium = true;
   {

@@ -1,4 +1,5 @@
-/* Numbers with derivatives: every function against differences, what happens where a function has none, and that they are values */
+/* Numbers with derivatives: every function against differences, behaviour where a function has no derivative, and
+   independence of their operands */
 #include "hhtdae/dual.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +18,8 @@ const double kInf = std::numeric_limits<double>::infinity();
 
 double near(double x) { return 1e-8 * (1 + std::abs(x)); }
 
-/* f, a generic function of one number, at x: values as of doubles, f' of all kinds of numbers and f'' against differences */
+/* Checks a generic function f of one number at x: values equal those of doubles, f' for all kinds of numbers and f''
+   against differences */
 template <class F> void ExpectDerivatives(const char *name, F f, std::initializer_list<double> points)
 {
   using Second = Dual<1, Dual<1>>;
@@ -45,7 +47,7 @@ template <class F> void ExpectDerivatives(const char *name, F f, std::initialize
   }
 }
 
-/* The first derivative of a number of which it may be that none is known: a constant has no place for any */
+/* First derivative of a number that may be a constant, which has no storage for derivatives */
 double slope(const Real &x) { return x.derivatives().size() ? x.derivatives()(0) : 0.; }
 
 /* f(x, y): gradient and mixed second derivatives */
@@ -70,7 +72,7 @@ template <class F> void ExpectGradient(const char *name, F f, double x, double y
       EXPECT_NEAR(w.derivatives()(a).derivatives()(b), f2, near(f2)) << a << b;
     }
   }
-  /* one argument a plain number */
+  /* one of the arguments is a plain number */
   EXPECT_NEAR(f(First(x, 0), y).derivatives()(0), f1[0], near(f1[0]));
   EXPECT_NEAR(f(x, First(y, 1)).derivatives()(1), f1[1], near(f1[1]));
   EXPECT_NEAR(slope(f(Real(x, 1, 0), y)), f1[0], near(f1[0]));
@@ -147,7 +149,7 @@ TEST(DualNumbers, MinAndMaxNextToThoseOfTheStandardLibrary)
   EXPECT_EQ(min(1, x).value(), 1);
   EXPECT_EQ(min(y, 3).derivatives()(0), 1);
   EXPECT_EQ(max(0., y).value(), 2);
-  EXPECT_EQ(max(x, 2.).derivatives()(0), 1); /* equal: the first */
+  EXPECT_EQ(max(x, 2.).derivatives()(0), 1); /* for equal arguments that of the first one */
   EXPECT_EQ(max(2., x).derivatives()(0), 0);
   EXPECT_EQ(min(y, 2).derivatives()(0), 1);
 }
@@ -181,7 +183,7 @@ TEST(DualNumbers, AnyOtherFunctionByItsDerivative)
   EXPECT_EQ(chain(Real(3, 2, 1), 7, .5).derivatives()(1), .5);
 }
 
-/* ---- where there is no derivative, or no finite one; the constant has none there either ---- */
+/* ---- points without a derivative, or with an infinite one; there a constant argument gives no derivative either ---- */
 
 template <class F> double Slope(F f, double x)
 {
@@ -242,7 +244,7 @@ TEST(DualNumbers, Powers)
   EXPECT_EQ(pow(Dual<1>(0, 0), 0).value(), 1);
   EXPECT_TRUE(std::isnan(pow(Dual<1>(-2, 0), .5).value()));
   EXPECT_TRUE(std::isnan(Slope([](auto x) { return pow(x, .5); }, -2)));
-  /* the exponent a number with derivatives: one that does not change is as good as a plain one */
+  /* An exponent that is a number with derivatives but does not change acts like a plain one */
   EXPECT_EQ(Slope([](auto x) { return pow(x, decltype(x)(3)); }, -2), 12);
   EXPECT_EQ(Slope([](auto x) { return pow(x, decltype(x)(2)); }, 0), 0);
   EXPECT_EQ(Slope([](auto x) { return pow(x, decltype(x)(0)); }, 0), 0);
@@ -259,7 +261,7 @@ TEST(DualNumbers, TheyAreValues)
   static_assert(std::is_trivially_copyable<Dual<12>>::value && std::is_trivially_copyable<Real>::value, "copied as bytes");
   static_assert(sizeof(Dual<12>) == 13 * sizeof(double), "a plain array");
   static_assert(!std::is_convertible<Dual<2>, Dual<3>>::value && !std::is_convertible<Dual<2>, double>::value, "no silent loss");
-  const auto law = [](const Real &l, const Real &v) { return 100 * l * l + 2 * v; }; /* no "-> Real": what it returns is a number */
+  const auto law = [](const Real &l, const Real &v) { return 100 * l * l + 2 * v; }; /* the result is a number even without "-> Real" */
   static_assert(std::is_same<decltype(law(Real(), Real())), Real>::value, "not an expression");
   const auto kept = law(Real(2, 2, 0), Real(3, 2, 1));
   EXPECT_EQ(kept.value(), 406);

@@ -1,4 +1,4 @@
-/* Static equilibrium where forces set in along the way: contacts and stops. */
+/* Static equilibrium where forces set in during the search: contacts and stops */
 #include "hhtdae/analyses.h"
 #include "hhtdae/helpers.h"
 #include "hhtdae/query.h"
@@ -14,7 +14,7 @@ namespace
 
 constexpr double g = 10;
 
-/* A ball of 1 kg and radius 1 that a guide lets move along z alone, its centre at z at first */
+/* A ball of 1 kg and radius 1 that a guide lets move along z only, with its centre at z initially */
 struct Guided {
   Scene  scene{PETSC_COMM_SELF};
   Body   ball;
@@ -49,7 +49,7 @@ ContactLaw Law(double stiffness, double exponent)
 
 } // namespace
 
-/* From in front of a contact, its beginning and within: where the law carries the weight */
+/* From positions before contact, at its beginning and within it: in equilibrium the contact law carries the weight */
 TEST(SceneEquilibrium, ABallOnAPlane)
 {
   for (double exponent : {1., 1.5, 2.})
@@ -65,7 +65,8 @@ TEST(SceneEquilibrium, ABallOnAPlane)
       }
 }
 
-/* A wheel whose centre of mass is 0.3 m beside its centre rolls down an incline until that hangs above the contact: it moves as far as it turns */
+/* A wheel whose centre of mass is 0.3 m off its centre rolls down an incline until the centre of mass is above the
+   contact point; rolling couples displacement and rotation */
 TEST(SceneEquilibrium, AnEccentricWheelRolls)
 {
   const double slope = 0.3, R = 0.5, e = 0.3, spin = 1, weight = 4 * g;
@@ -96,7 +97,7 @@ TEST(SceneEquilibrium, AnEccentricWheelRolls)
   }
 }
 
-/* The same with the end of a travel: from the stop itself, and from the air */
+/* The same with a stop: from the stop itself, and from a distance */
 TEST(SceneEquilibrium, ABallOnAStop)
 {
   for (double stiffness : {1e4, 1e6, 1e8})
@@ -111,7 +112,8 @@ TEST(SceneEquilibrium, ABallOnAStop)
     }
 }
 
-/* A rod whose end falls on rough ground and slides there before it comes to rest: as without friction, whose slip velocity is no limit of the way */
+/* A rod whose end falls on rough ground and slides before it comes to rest: the equilibrium is that without friction,
+   and the small slip velocity of the friction law does not limit the steps of the search */
 TEST(SceneEquilibrium, ALeverOnRoughGround)
 {
   double height[2];
@@ -135,7 +137,8 @@ TEST(SceneEquilibrium, ALeverOnRoughGround)
   EXPECT_NEAR(height[1], height[0], 1e-9);
 }
 
-/* Where friction in a joint and a damper let things but creep, forces fall slowly: steps grow all the same */
+/* A strong damper lets the body only creep towards equilibrium, and forces decrease slowly: the steps of the search
+   must grow nevertheless */
 TEST(SceneEquilibrium, StrongDamping)
 {
   Guided       s(1);
@@ -173,7 +176,8 @@ TEST(SceneEquilibrium, ALoopThroughAVariable)
   }
 }
 
-/* A body that springs alone hold: what is left of its forces is rounding, and there are no accelerations or reactions to measure it by */
+/* Bodies held by springs alone: the remaining forces are rounding errors, and there are no accelerations or reactions
+   to compare them with */
 TEST(SceneEquilibrium, OfBodiesOnSprings)
 {
   for (int seed = 1; seed <= 200; seed++) {
@@ -207,7 +211,7 @@ TEST(SceneEquilibrium, OfBodiesOnSprings)
 namespace
 {
 
-/* A body of 1 kg in a guide along z, and what its run says after StaticEquilibrium() */
+/* A body of 1 kg in a guide along z, and measures of its run after StaticEquilibrium() */
 struct Levelled {
   Scene  scene{PETSC_COMM_SELF};
   Marker q, g;
@@ -237,7 +241,8 @@ struct Levelled {
 
 } // namespace
 
-/* The stiffness x of a spring that levels the mass at -0.05, x' = 200 (-0.05 - z): at z = 0 nothing reads x, in equilibrium the weight does */
+/* A self-levelling spring whose stiffness x is a state, x' = 200 (-0.05 - z): at z = 0 no force depends on x, in
+   equilibrium x carries the weight */
 TEST(SceneEquilibrium, AStateThatIsAFactor)
 {
   for (bool at_the_start : {false, true})
@@ -262,8 +267,8 @@ TEST(SceneEquilibrium, AStateThatIsAFactor)
     }
 }
 
-/* A pendulum with a moment x about its axis of symmetry, x' = rate (1 - x): x comes to 1, however slow it is, however heavy the body, in whatever unit,
-   from where the body is balanced and from elsewhere */
+/* A pendulum with a moment x about its axis of symmetry, x' = rate (1 - x): in equilibrium x = 1, for any rate, mass
+   and unit, starting where the body is balanced or elsewhere */
 TEST(SceneEquilibrium, SlowStates)
 {
   for (double unit : {1., 1e-6})
@@ -304,7 +309,7 @@ TEST(SceneEquilibrium, SlowStates)
         }
 }
 
-/* A motion of a velocity that is not zero has no equilibrium, however small it is beside the weight */
+/* With a motion of nonzero velocity there is no equilibrium, however small its effect is compared with the weight */
 TEST(SceneEquilibrium, AMotionOfASmallVelocity)
 {
   for (double mass : {1., 1e6, 1e8}) {
@@ -325,8 +330,8 @@ TEST(SceneEquilibrium, AMotionOfASmallVelocity)
   }
 }
 
-/* A torsional spring turns the body by more than half a turn on the way to its free angle, and a wheel that a gear joins to it by another part of turns: a run
-   that begins there begins without a moment */
+/* On the way to its free angle a torsional spring turns the body by more than half a turn, and by a gear a second
+   wheel by another angle; a run that begins in this equilibrium begins without a moment */
 TEST(SceneEquilibrium, TurnsOnTheWay)
 {
   for (Space space : {Space::Planar, Space::Spatial})

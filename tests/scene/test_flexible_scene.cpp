@@ -1,4 +1,4 @@
-/* A flexible body in a scene: its equations against sums over particles, its Jacobian against differences, refusals. */
+/* A flexible body in a scene: its equations against sums over particles, its Jacobian against differences, refused input */
 #include "hhtdae/query.h"
 #include "hhtdae/scene.h"
 #include "modal_cloud.h"
@@ -27,7 +27,7 @@ FlexibleBody flexible(const ModalCloud &c, ModalMass mass = ModalMass::Full)
   return b;
 }
 
-/* Attached at one end to the ground by a ball joint, a spring and a rigid body at the other */
+/* A flexible arm attached to the ground at one end by a ball joint; a spring and a rigid body at the other end */
 struct Arm {
   Scene scene{PETSC_COMM_WORLD};
   Body  body;
@@ -51,7 +51,7 @@ struct Arm {
   }
 };
 
-/* sum over the particles of m (x'' - g) . dx/dq, by differences along the motion and along q */
+/* Sum over the particles of m (x'' - g) . dx/dq, by differences along the motion and with respect to q */
 double particles(const ModalCloud &c, AnyState &s, const Matrix3 &C, PetscInt first, PetscInt k, const Vector3 &g)
 {
   const int    m = (int)c.shape.cols();
@@ -65,7 +65,7 @@ double particles(const ModalCloud &c, AnyState &s, const Matrix3 &C, PetscInt fi
       x[i]     = q[first + i] + along[i];
     }
     Matrix3 A;
-    if (s.R.bodies.local) { /* x is a rotation vector, v an angular velocity */
+    if (s.R.bodies.local) { /* x is a rotation vector with the angular velocity v */
       Vector3 turn(q[first + 3], q[first + 4], q[first + 5]);
       if (k >= 3 && k < 6) turn(k - 3) += by;
       A = turned(Vector3(along[3], along[4], along[5])) * turned(turn);
@@ -88,7 +88,7 @@ double particles(const ModalCloud &c, AnyState &s, const Matrix3 &C, PetscInt fi
 
 } // namespace
 
-/* Free body, all mass terms: every row is the sum over the particles */
+/* A free body with all mass terms: every row of its equations is the sum over the particles */
 TEST(FlexibleScene, EquationsAreSumsOverParticles)
 {
   for (bool free : {true, false})
@@ -130,7 +130,7 @@ TEST(FlexibleScene, JacobianAgainstDifferences)
   }
 }
 
-/* A variable and a force that read modal coordinates and an attachment */
+/* A variable and a force that depend on modal coordinates and on an attachment */
 TEST(FlexibleScene, ExpressionsOfModalCoordinates)
 {
   const ModalCloud c(9, 5, 11, true);
@@ -153,7 +153,7 @@ TEST(FlexibleScene, ExpressionsOfModalCoordinates)
   EXPECT_TRUE(trap.says("modes 0 to 4")) << trap.message;
 }
 
-/* Hung at one attachment in static equilibrium: the modes carry the weight as their stiffness says */
+/* Suspended at one attachment in static equilibrium: the modal coordinates follow from the weight and the modal stiffness */
 TEST(FlexibleScene, StaticEquilibrium)
 {
   const ModalCloud c(9, 5, 11, true);
@@ -172,7 +172,7 @@ TEST(FlexibleScene, StaticEquilibrium)
   AnyState s(scene, 1, 0);
   must(VecSet(s.A, 0));
   must(VecSet(s.V, 0));
-  /* the clamp's force -m g and the moment of the weight about it work on the modes at the attachment */
+  /* the clamp's force -m g and moment, that of the weight about the clamp, do work on the modes at the attachment */
   const BodyData        &d = DataOf(scene).bodies[body.id];
   const ModalAttachment &a = c.body.attachments[0];
   const Eigen::Map<const Eigen::VectorXd> eta(d.flexible->deformation.data(), 5);
@@ -185,7 +185,8 @@ TEST(FlexibleScene, StaticEquilibrium)
   EXPECT_LT((eta - expected).norm(), 1e-8 * expected.norm());
 }
 
-/* The partial mass matrix leaves out what is quadratic in the modes, and so is exact to first order in a deformation at rest */
+/* The partial mass matrix omits the terms quadratic in the modal coordinates; for a body at rest it is exact to first
+   order in the deformation */
 TEST(FlexibleScene, PartialMassIsFirstOrder)
 {
   ModalCloud c(9, 3, 4, true);
@@ -223,7 +224,7 @@ TEST(FlexibleScene, TurnAndItsDifferential)
   }
 }
 
-/* Initial frames of attachments belong to the deformed body, positions and velocities */
+/* Attachment frames start with the positions and velocities of the deformed body */
 TEST(FlexibleScene, AttachmentsStartOnTheDeformedBody)
 {
   const ModalCloud c(9, 5, 11, true);
@@ -232,14 +233,14 @@ TEST(FlexibleScene, AttachmentsStartOnTheDeformedBody)
   b.deformation_rate = Eigen::VectorXd::LinSpaced(5, 1, -2);
   Scene scene(PETSC_COMM_WORLD);
   scene.attachment(scene.add("arm", b), "tip");
-  must(scene.setUp()); /* the assembly phase refuses what does not meet */
+  must(scene.setUp()); /* the assembly would refuse markers that do not coincide */
   EXPECT_LT(DataOf(scene).started.misfit, 1e-12);
   EXPECT_EQ(DataOf(scene).started.degreesOfFreedom(), 11);
   const Vector3 x = b.position + tilted * (c.X[1] + c.shape.middleRows<3>(3) * b.deformation);
   EXPECT_LT((DataOf(scene).bodies[1].r - x).norm(), 1e-12);
 }
 
-/* Loops that are redundant for a rigid body are not for a flexible one, and rows drop when modes do not make up for them */
+/* A closed loop that is redundant for a rigid body is not redundant for a flexible one; rows are dropped only without modes */
 TEST(FlexibleScene, ModesFreeLoopsOfRedundancy)
 {
   for (int modes : {8, 0}) {
@@ -258,7 +259,8 @@ TEST(FlexibleScene, ModesFreeLoopsOfRedundancy)
   }
 }
 
-/* They have no place in the run: nothing can be said of them, though they have handles of this scene */
+/* Attachments and elements added after the run was made are not part of it: questions about them are refused, although
+   their handles belong to this scene */
 TEST(FlexibleScene, LateAttachmentsAndElementsAreRefused)
 {
   const ModalCloud c(9, 3, 11, false);
@@ -271,7 +273,7 @@ TEST(FlexibleScene, LateAttachmentsAndElementsAreRefused)
   Load             l;
   double           y;
   must(now.take(run.ts));
-  must(now.motion(scene.marker(hub, {0.1, 0, 0}), &x)); /* a marker alone may come at any time */
+  must(now.motion(scene.marker(hub, {0.1, 0, 0}), &x)); /* markers may be added at any time */
   const Body    tip  = scene.attachment(body, "tip");
   const Marker  late = scene.marker(tip);
   const Element e    = scene.add("spring", SpringDamper{late, scene.marker(scene.ground()), 1});

@@ -1,5 +1,4 @@
-/* Springs, torsional springs, bushings and beams as a scene takes them: what is refused and by which words, and short
- * runs */
+/* Springs, torsional springs, bushings and beams in a scene: which input is refused with which message, and short runs */
 #include "scene/kernels/beam.h"
 #include "scene/runtime.h"
 
@@ -26,7 +25,7 @@ struct Fixture {
     point      = scene.add("bead", p);
     root       = scene.marker(scene.ground());
     tip        = scene.marker(body);
-    away       = scene.markerAt(body, Vector3::Zero()); /* where root is */
+    away       = scene.markerAt(body, Vector3::Zero()); /* at the position of root */
     mass       = scene.marker(point);
     beside     = scene.marker(body, {0, 1, 0});
   }
@@ -179,7 +178,7 @@ struct Motion {
   Matrix<6, 1> q, v; /* of the centre of mass and rotation */
 };
 
-/* A body beside the ground, thrown and spinning, held by one element; where it is at t = 0.4 */
+/* A body that is thrown with a spin and held to the ground by one element; its position at t = 0.4 */
 template <class Spec> PetscErrorCode Throw(const Spec &spec, Motion *m)
 {
   Scene              scene(PETSC_COMM_SELF);
@@ -218,7 +217,7 @@ template <class Spec> PetscErrorCode Throw(const Spec &spec, Motion *m)
   PetscFunctionReturn(0);
 }
 
-/* eliminated or carried as force states, the element is the same, and does something */
+/* The element gives the same motion whether its force is eliminated or a force state, and it has an effect */
 template <class Spec> void ExpectSameAsState(Spec s)
 {
   Motion eliminated, carried, unloaded;

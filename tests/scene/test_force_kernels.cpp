@@ -23,7 +23,7 @@ CurveSpring::Data CurveData(Random &random)
   return {[=](const Real &l, const Real &v) -> Real { return k * l * l * l + c * sin(v) * l; }};
 }
 
-/* x_i well away from z_j, where the angle is undefined */
+/* keeps x_i away from z_j, where the angle is undefined */
 void DefinedAngle(Random &random, Frame<double> *f)
 {
   while (std::abs(f[0].R.col(0).dot(f[1].R.col(2))) > .9) f[0].R = random.rotation();
@@ -34,7 +34,7 @@ template <bool Damped> typename LinearTorsion<Damped>::Data TorsionData(Random &
   DefinedAngle(random, f);
   typename LinearTorsion<Damped>::Data d = {
       {random(-10, 10)}, random(.5, 3), random(.5, 2), random(-4, 4), random(-1, 1)};
-  LinearTorsion<Damped>::accept(d, f); /* else a difference might cross half a turn from what is remembered */
+  LinearTorsion<Damped>::accept(d, f); /* otherwise a difference might pass half a turn from the counted angle */
   return d;
 }
 
@@ -76,7 +76,7 @@ TEST(RotationVector, InvertsTheExponential)
       const Mat3<double>       H = RotationMatrix<double>(h);
       EXPECT_LT((H - Eigen::AngleAxisd(angle / 2, axis).toRotationMatrix()).norm(), 1e-14);
     }
-  /* of half a turn either sign is right */
+  /* for half a turn either sign is right */
   for (int k = 0; k < 3; k++) {
     const Mat3<double> R   = Eigen::AngleAxisd(M_PI, Vec3<double>::Unit(k)).toRotationMatrix();
     const Vec3<double> phi = RotationVector<double>(UnitQuaternion<double>(R)).cwiseAbs();
@@ -99,7 +99,7 @@ TEST(RotationVector, HasTheDifferentialOfTheLogarithm)
   }
 }
 
-/* closed forms on one side of the switch, series on the other */
+/* closed forms on one side of the switch and series on the other agree */
 TEST(RotationVector, SeriesMeetClosedForms)
 {
   for (double s : {.009999, .0100001, .049999, .050001}) {
@@ -165,13 +165,14 @@ TEST(Spring, CoincidentOrigins)
   EXPECT_EQ(on[0].f, Vector3(-2, -4, -4));
   EXPECT_EQ((J.frames.block<3, 3>(0, 0)), -5 * Matrix3::Identity());
   EXPECT_EQ((J.twists.block<3, 3>(0, 6)), 2 * Matrix3::Identity());
-  /* and next to it the same stiffness in all directions */
+  /* and next to this position the stiffness is the same in all directions */
   f[0].x(0) += 1e-9;
   LinearSpring<false>::jacobian({5, 0, 0, 0}, f, nullptr, 0, nullptr, on, J);
   EXPECT_LT((J.frames.block<3, 3>(0, 0) + 5 * Matrix3::Identity()).norm(), 1e-14);
   EXPECT_LT((on[0].f + 5 * (f[0].x - f[1].x)).norm(), 1e-22);
 
-  /* a free length: no force for want of a direction, nothing infinite; automatic derivatives (force states) too */
+  /* With a free length and coinciding ends there is no direction and hence no force, and nothing is infinite; the same
+     with automatic derivatives (force states) */
   f[0].x = f[1].x;
   f[0].R = f[1].R = Matrix3::Identity();
   LinearSpring<true>::jacobian({5, 2, 3, 1}, f, w, 0, nullptr, on, J);
@@ -186,7 +187,7 @@ TEST(Spring, CoincidentOrigins)
   EXPECT_TRUE(J.frames.allFinite() && J.twists.allFinite());
 }
 
-/* the same law, as numbers and as a function */
+/* The same law given by numbers and by a function */
 TEST(Spring, FunctionOfLengthAndRate)
 {
   const LinearSpring<true>::Data data = {10, 4, 2, 6};
@@ -230,7 +231,7 @@ TEST(Torsion, Potential)
   ExpectObjective<LinearTorsion<true>>(TorsionData<true>);
 }
 
-/* i turns about z_j through three turns in steps of 100 degrees, then back; the moment knows how far it is */
+/* i turns about z_j by three turns in steps of 100 degrees, and back; the moment follows the counted angle */
 TEST(Torsion, CountsTurns)
 {
   Random                    random(9);
@@ -277,7 +278,7 @@ TEST(Bushing, Potential)
   ExpectObjective<BushingForce<true>>(BushingData<true>);
 }
 
-/* aligned frames: everything is linear and in j's axes, the matrix at rest is that of six springs */
+/* With aligned frames everything is linear and in j's axes; the matrix at rest is that of six springs */
 TEST(Bushing, KnownValues)
 {
   const BushingForce<true>::Data data = {{1, 2, 3}, {4, 5, 6}, {.1, .2, .3}, {.4, .5, .6}, {7, 8, 9}, {-1, -2, -3}};
@@ -295,8 +296,8 @@ TEST(Bushing, KnownValues)
   EXPECT_LT((on[1].m + R * (moment + d.cross(force))).norm(), 1e-13);
 }
 
-/* about one of the principal axes the moment is -k times the angle, as far as half a turn; with equal stiffnesses about
- * any axis */
+/* For a rotation about a principal axis the moment is -k times the angle, up to half a turn; with equal stiffnesses
+   about any axis */
 TEST(Bushing, LargeRotations)
 {
   BushingForce<false>::Data data = {Vector3::Zero(), {4, 5, 6},       Vector3::Zero(),

@@ -1,4 +1,4 @@
-/* Friction in joints: derivatives, the limits mu N and rest, power, and the loads that the reaction makes */
+/* Friction in joints: derivatives, the limits mu N and rest, dissipation, and the loads that follow from the reaction */
 #include "kernel_checks.h"
 #include "scene/kernels/friction.h"
 #include "scene/model.h"
@@ -72,7 +72,7 @@ TYPED_TEST(JointFrictionKernel, VanishesWithoutLoadAndAtRest)
   EXPECT_TRUE(J.frames.allFinite() && J.twists.allFinite() && J.inputs.allFinite());
 }
 
-/* Units of force do not matter: mu N is as exact for a load of 1e-12 as for one of 1e12 */
+/* The law does not depend on the unit of force: mu N is as accurate for a load of 1e-12 as for 1e12 */
 TYPED_TEST(JointFrictionKernel, GrowsWithTheLoadInAnyUnits)
 {
   Random                     random(6);
@@ -88,7 +88,7 @@ TYPED_TEST(JointFrictionKernel, GrowsWithTheLoadInAnyUnits)
   }
 }
 
-/* a shaft that turns with both bodies does not slip */
+/* If the shaft turns with both bodies there is no slip */
 TYPED_TEST(JointFrictionKernel, RigidMotionOfBothDoesNotSlip)
 {
   Random                     random(7);
@@ -100,14 +100,14 @@ TYPED_TEST(JointFrictionKernel, RigidMotionOfBothDoesNotSlip)
   for (int r = 0; r < TypeParam::count; r++) EXPECT_NEAR(e.c[r], 0, 1e-14);
 }
 
-/* fast slip: mu r N about z_j against the rotation, N = |(2, 3, 6)| = 7 */
+/* Fast slip: the moment mu r N about z_j opposes the rotation, N = |(2, 3, 6)| = 7 */
 TEST(JointFriction, RevoluteKnownValue)
 {
   const FrictionData  d{.2, .5, 1e-3, 0};
   const Frame<double> f[2]    = {origin, origin};
   Twist<double>       w[2]    = {rest, rest};
   const double        load[3] = {2, 3, 6};
-  w[0].w                      = {5, 7, 3}; /* only the part about z counts */
+  w[0].w                      = {5, 7, 3}; /* only the component about z matters */
   const Evaluated<RevoluteFriction<3>> e(d, f, w, load);
   EXPECT_NEAR(e.on[0].m(2), -.2 * .5 * 7, 1e-8);
   EXPECT_EQ(e.on[0].m(0), 0);
@@ -132,7 +132,7 @@ TEST(JointFriction, TranslationalKnownValue)
   }
 }
 
-/* slip (3, 4) along and around: the friction force mu N has that direction */
+/* Slip with the components 3 along and 4 around the axis: the friction force mu N has the opposite direction */
 TEST(JointFriction, CylindricalFrictionFollowsTheHelix)
 {
   const FrictionData  d{.5, 2, 1e-3, 0};
@@ -158,7 +158,7 @@ TEST(JointFriction, SphericalMomentOpposesTheRelativeRotation)
   EXPECT_LT((e.on[0].m + .1 * 3 * 5 * Vec3<double>(1, 2, 2) / 3).norm(), 1e-8);
 }
 
-/* tanh(x)/x by either of its two ways, with its derivative by y = x^2 */
+/* Both formulas for tanh(x)/x, and their derivative with respect to y = x^2, agree */
 TEST(JointFriction, RegularizationIsSmoothAtRest)
 {
   for (double x : {1e-9, 1e-3, .01, .031, .032, .1, .5, 2., 19., 21., 1e3}) {
@@ -235,7 +235,7 @@ TEST(JointFrictionEntry, RefusesByName)
 namespace
 {
 
-/* rates of the coordinates of a scene at the end of a run */
+/* Rates of the coordinates of a scene at the end of a run */
 Eigen::VectorXd RatesAfter(Scene &scene, double end)
 {
   TS  ts;
@@ -257,7 +257,7 @@ Eigen::VectorXd RatesAfter(Scene &scene, double end)
 
 } // namespace
 
-/* a flywheel in bearings of load m g slows down at mu r m g/I; a block on a rail at mu g */
+/* A flywheel in bearings with the load m g slows down at mu r m g/I; a block on a rail at mu g */
 TEST(JointFrictionEntry, SlowsDownAsCoulombSays)
 {
   const double g = 9.81, mu = .2, r = .5, t = .5;
@@ -273,7 +273,7 @@ TEST(JointFrictionEntry, SlowsDownAsCoulombSays)
     scene.add("friction", JointFriction{pin, mu, r});
     const Eigen::VectorXd v = RatesAfter(scene, t);
     const double          w = 4 - mu * r * 2 * g / 3 * t;
-    EXPECT_NEAR(planar ? v(2) : v.segment<3>(3).sum(), w, 1e-4); /* turns about z alone: the Euler rates add up to it */
+    EXPECT_NEAR(planar ? v(2) : v.segment<3>(3).sum(), w, 1e-4); /* rotation about z only: the sum of the Euler rates is the angular velocity */
   }
   Matrix3 axes;
   axes << 0, 0, 1, 1, 0, 0, 0, 1, 0; /* z_j along x */
@@ -292,7 +292,8 @@ TEST(JointFrictionEntry, SlowsDownAsCoulombSays)
   }
 }
 
-/* A crank drives a piston under gas through a rod at 1 rad; the search for accelerations goes at a rate of mu tan(1) or so */
+/* A crank drives a piston under gas pressure through a rod at 1 rad; the iteration for initial accelerations converges
+   with a rate of about mu tan(1) */
 TEST(JointFrictionEntry, StartsAtAnyCoefficient)
 {
   for (double mu = .1; mu < .25; mu += .005) {

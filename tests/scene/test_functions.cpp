@@ -1,4 +1,4 @@
-/* Functions of time: values, derivatives against closed forms and differences, smoothness, and what they refuse */
+/* Functions of time: values, derivatives against closed forms and differences, smoothness, and refused input */
 #include "hhtdae/functions.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ using Formula = TimeFunction::Number;
 namespace
 {
 
-/* f1 and f2 against central differences of f and f1: error of order d^2, of f of size one */
+/* f1 and f2 against central differences of f and f1, whose error is of order d^2 for f of order one */
 void ExpectDerivatives(const TimeFunction &f, double t, double tolerance = 1e-8)
 {
   const double              d = 1e-5;
@@ -78,14 +78,14 @@ TEST(TimeFunctions, StepIsAQuinticWithFlatEnds)
     EXPECT_EQ(f(t).f2, 0);
   }
   EXPECT_NEAR(f(2).f, (x0 + x1) / 2, 1e-14);
-  EXPECT_NEAR(f(2).f1, 15. / 8 * (x1 - x0) / (t1 - t0), 1e-13); /* the quintic's steepest slope */
+  EXPECT_NEAR(f(2).f1, 15. / 8 * (x1 - x0) / (t1 - t0), 1e-13); /* the largest slope of the quintic */
   EXPECT_NEAR(f(2).f2, 0, 1e-13);
   const double s = .3; /* 10 s^3 - 15 s^4 + 6 s^5 */
   EXPECT_NEAR(f(t0 + 2 * s).f, x0 + 7 * s * s * s * (10 - 15 * s + 6 * s * s), 1e-13);
   for (double t : {1.1, 1.7, 2.2, 2.9}) ExpectDerivatives(f, t);
 }
 
-/* Value and two derivatives meet where pieces join: jumps over 2 d are of order d */
+/* Value and two derivatives are continuous where pieces join: differences over 2 d are of order d */
 TEST(TimeFunctions, PiecesAreTwiceContinuouslyDifferentiable)
 {
   const std::vector<double> t{-1, 0, .3, 1.5, 2, 4}, x{2, -1, .5, .7, 3, -2};
@@ -121,7 +121,7 @@ TEST(TimeFunctions, SplineThroughThreePointsHasItsClosedForm)
     EXPECT_NEAR(f(t).f1, 1.5 - 1.5 * t * t, 1e-15);
     EXPECT_NEAR(f(t).f2, -3 * t, 1e-15);
   }
-  EXPECT_NEAR(f(-2).f, -3, 1e-15); /* the tangent at the end */
+  EXPECT_NEAR(f(-2).f, -3, 1e-15); /* the slope at the end */
   EXPECT_NEAR(f(5).f, -4.5, 1e-15);
   EXPECT_EQ(f(5).f2, 0);
 }
@@ -138,7 +138,7 @@ TEST(TimeFunctions, SplineOfALineIsTheLine)
   }
 }
 
-/* sin has no second derivative at 0 and pi, so that the natural ends do not spoil the order */
+/* sin has no second derivative at 0 and pi, so that natural end conditions do not reduce the order */
 TEST(TimeFunctions, SplineConvergesWithFourthOrder)
 {
   double error[2];
@@ -219,7 +219,7 @@ TEST(TimeFunctions, BadInputIsNamed)
   says(TimeFunction::values({}), "empty");
 }
 
-/* Nothing hides a value that is no number: it reaches whoever asks */
+/* A value that is NaN is passed on, not hidden */
 TEST(TimeFunctions, NotANumberPassesThrough)
 {
   for (const TimeFunction &f : {TimeFunction::polynomial({1, 2}), TimeFunction::harmonic(1, 1),

@@ -1,4 +1,4 @@
-/* Axes, moments of inertia against sums over points, joints from a point and an axis. */
+/* Axes; moments of inertia against sums over points; joints from a point and an axis */
 #include "hhtdae/helpers.h"
 #include "hhtdae/query.h"
 #include "scene_output.h"
@@ -8,7 +8,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Of the points of a cube of half edge `half` that are inside, all of the same mass */
+/* Inertia of those points of a cube of half edge `half` that are inside; all points have the same mass */
 template <class Inside> Matrix3 summed(double mass, double half, const Inside &inside)
 {
   const int n = 80;
@@ -40,7 +40,7 @@ TEST(Helpers, Inertia)
   expectNear(inertia::disc(2, 0.9), inertia::diagonal(0.405, 0.405, 0.81), 1e-14);
 }
 
-/* A box of two halves is the whole box, wherever its halves are given and however they are turned */
+/* A box composed of two halves has the inertia of the whole box, for any position and orientation of the halves */
 TEST(Helpers, Composed)
 {
   const Matrix3   R = axesAlong({1, 2, 3}, {0, 1, 0});
@@ -71,7 +71,8 @@ TEST(Helpers, AxesAlong)
   EXPECT_LT((axesAlong({0, 0, 1}, {1, 0, 5}) - Matrix3::Identity()).norm(), 1e-14);
 }
 
-/* Without x: the axis of space along which z has its least component, the first one of several, less its part along z, as in Python's axes_along() */
+/* Without a given x: x is the space axis along which z has its smallest component (the first of several), minus its
+   component along z, as in Python's axes_along() */
 TEST(Helpers, AxesAlongOneDirection)
 {
   const Vector3 ex(1, 0, 0), ey(0, 1, 0), ez(0, 0, 1);
@@ -89,7 +90,7 @@ TEST(Helpers, AxesAlongOneDirection)
     }
 }
 
-/* In a planar scene connect() lets a body slide along x of space */
+/* In a planar scene connect() with Translational lets a body slide along the x axis of space */
 TEST(Helpers, ASlideInThePlane)
 {
   Scene     scene(PETSC_COMM_SELF, Space::Planar);
@@ -111,7 +112,7 @@ TEST(Helpers, ASlideInThePlane)
   EXPECT_NEAR(now[2], 10, 1e-5);
 }
 
-/* A rod on a pin through its end, about a slanted axis, swings like a pendulum of its moment about the pin */
+/* A rod with a pin through its end about a slanted axis swings like a pendulum with the moment of inertia about the pin */
 TEST(Helpers, AJointFromAPointAndAnAxis)
 {
   Scene         scene(PETSC_COMM_SELF);

@@ -1,4 +1,4 @@
-/* Joints as a scene takes them: their rows, what is refused and by which words, and runs with known solutions */
+/* Joints in a scene: numbers of rows, which input is refused with which message, and runs with known solutions */
 #include "scene/runtime.h"
 
 #include <gtest/gtest.h>
@@ -59,7 +59,7 @@ void ExpectSays(const std::string &errors, const std::string &words)
   EXPECT_NE(errors.find(words), std::string::npos) << "expected: " << words << "\ngot: " << errors;
 }
 
-/* holonomic and velocity-level rows of the joint, minus one where it is refused */
+/* Numbers of holonomic and velocity-level rows of the joint; -1 where the joint is refused */
 struct Rows {
   int position, velocity;
 };
@@ -116,7 +116,7 @@ TEST(JointEntries, Rows)
   ExpectRows(Line(), {2, 0}, {1, 0});
   ExpectRows(RollingSphere{}, {1, 2});
   ExpectRows(KnifeEdge{}, {1, 1});
-  ExpectRows(hhtdae::RollingDisc{}, kRefused, {1, 1}); /* in space it would lie flat */
+  ExpectRows(hhtdae::RollingDisc{}, kRefused, {1, 1}); /* refused in space, where the disc would lie flat */
 }
 
 TEST(JointEntries, RefuseOneBodyAndPointMasses)
@@ -167,7 +167,7 @@ namespace
 
 constexpr double g = 9.81;
 
-/* where the bodies of a scene are at time T */
+/* positions of the bodies of a scene at time T */
 struct Final {
   Scene                  &scene;
   std::vector<BodyMotion> bodies;
@@ -227,7 +227,7 @@ TEST(JointRuns, BallOnAnIncline)
   }
 }
 
-/* A wheel down an incline: 2/3 g sin a, as a disc in space and in a planar scene */
+/* A wheel rolls down an incline with 2/3 g sin a, as a disc in space and in a planar scene */
 TEST(JointRuns, WheelOnAnIncline)
 {
   const double a = .3, r = .5, T = .8, mass = 2, s = .5 * 2. / 3. * g * std::sin(a) * T * T;
@@ -239,7 +239,7 @@ TEST(JointRuns, WheelOnAnIncline)
     b.inertia            = mass * r * r * Vector3(.25, .25, .5).asDiagonal();
     const Matrix3 R      = planar ? About(Vector3::UnitZ(), -a) : About(Vector3::UnitY(), a);
     const Vector3 normal = planar ? R.col(1) : R.col(2), axis = planar ? R.col(2) : R.col(1);
-    b.rotation       = planar ? Matrix3(Matrix3::Identity()) : About(Vector3::UnitX(), -M_PI / 2); /* z_i is y */
+    b.rotation       = planar ? Matrix3(Matrix3::Identity()) : About(Vector3::UnitX(), -M_PI / 2); /* z_i is along y */
     b.position       = r * normal;
     const Body wheel = scene.add("wheel", b);
     scene.add("rolls", hhtdae::RollingDisc{scene.marker(wheel), scene.marker(scene.ground(), {0, 0, 0}, R), r});
@@ -294,7 +294,7 @@ TEST(JointRuns, BeadOnAHelix)
   EXPECT_LT((end[bead].r - helix(.5 * g * std::sin(p) * T * T / per)).norm(), 2e-5);
 }
 
-/* A bead thrown round and round a closed curve in the plane: its energy stays. */
+/* A bead moves round a closed curve in the plane several times; its energy is constant */
 TEST(JointRuns, BeadRoundACircleInThePlane)
 {
   const double v0 = 7, T = 3;
@@ -350,7 +350,7 @@ TEST(JointRuns, BentShafts)
   }
 }
 
-/* ---- every joint between two bodies in free flight: momentum, angular momentum and energy stay ---- */
+/* ---- two bodies in free flight, connected by each joint in turn: momentum, angular momentum and energy are constant ---- */
 
 namespace
 {
@@ -367,14 +367,14 @@ struct Totals {
   }
 };
 
-/* At the start the bodies move as one, which every joint allows: marker i is at `offset` in j's axes, turned by `turn`
- * in them. */
+/* Initially the bodies move as one rigid body, which every joint permits: marker i is at `offset` in j's axes and
+   rotated by `turn` in them */
 template <class Spec>
 void FlyTogether(Spec s, const Vector3 &offset = {0, 0, 0}, const Matrix3 &turn = Matrix3::Identity(),
                  Space space = Space::Spatial)
 {
   const bool    planar = space == Space::Planar;
-  const double  out    = planar ? 0 : 1; /* of the plane */
+  const double  out    = planar ? 0 : 1; /* 0 in the plane, where out-of-plane components must vanish */
   Scene         scene(PETSC_COMM_SELF, space);
   RigidBody     part[2];
   Body          body[2];
@@ -438,7 +438,8 @@ TEST(JointRuns, RollingKeepsMomentumAndEnergy)
   FlyTogether(KnifeEdge{}, {.2, .1, 0}, About(Vector3::UnitX(), .4));
 }
 
-/* A coin let go upright but for half a radian: when it lies flat it has no lowest point, and the run ends with an error before, with the energy of its start */
+/* A coin released at half a radian from upright. A disc lying flat has no lowest point: the run ends with an error
+   before, with the energy of its start */
 TEST(JointRuns, ADiscThatFallsFlat)
 {
   for (const char *tolerance : {"-ts_rtol 1e-4 -ts_atol 1e-4", "-ts_rtol 1e-6 -ts_atol 1e-6", "-ts_rtol 1e-8 -ts_atol 1e-8"}) {
@@ -466,7 +467,8 @@ TEST(JointRuns, ADiscThatFallsFlat)
   }
 }
 
-/* A bob on a link of 1 m that is drawn along x to where the link does not reach, beside another one that swings: the error names the one that is stuck */
+/* A bob on a link of 1 m is drawn along x to where the link does not reach, beside another bob that swings: the error
+   names the one that is stuck */
 TEST(JointRuns, AMotionBeyondReach)
 {
   Scene      s(PETSC_COMM_SELF, Space::Planar);

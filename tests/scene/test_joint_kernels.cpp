@@ -1,5 +1,5 @@
-/* Kernels of joints: derivatives over random states, what their multipliers are, and whether the checks themselves can
- * fail */
+/* Kernels of joints: derivatives at random states, meaning of their multipliers, and whether the checks themselves
+   detect errors */
 #include "kernel_checks.h"
 #include "scene/kernels/convel.h"
 #include "scene/kernels/primitives.h"
@@ -31,14 +31,14 @@ TEST(JointKernels, AxesDerivatives)
   CheckConstraint<EqualRotation<true>>();
 }
 
-/* ---- what the multipliers are ---- */
+/* ---- meaning of the multipliers ---- */
 
 namespace
 {
 
 Mat3<double> AboutAxis(const Vec3<double> &axis, double angle) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
 
-/* i and j somewhere, with parallel axes; i is at `local` in j's axes and turned by `turn` in them */
+/* i and j in a random position with parallel axes; i is at `local` in j's axes and rotated by `turn` in them */
 struct Pair {
   Frame<double> f[2];
   explicit Pair(Random &random, const Vec3<double> &local = Vec3<double>::Zero(),
@@ -50,7 +50,7 @@ struct Pair {
   Vec3<double> j(int axis) const { return f[1].R.col(axis); }
 };
 
-/* the reaction -J^T lambda with multiplier 1 in row r: force and moment on i, force and moment on j */
+/* The reaction -J^T lambda for the multiplier 1 in row r: force and moment on i, force and moment on j */
 template <class K> Matrix<12, 1> Reaction(const Pair &p, int r, const typename K::Data &data = {})
 {
   typename K::Gradient J;
@@ -61,7 +61,7 @@ template <class K> Matrix<12, 1> Reaction(const Pair &p, int r, const typename K
   return -J.row(r).transpose();
 }
 
-/* a force at i's origin and its opposite at the same point of j, or a moment and its opposite */
+/* A force at i's origin and its opposite at the same point of j; or a moment and its opposite */
 void ExpectForce(const Pair &p, const Matrix<12, 1> &reaction, const Vec3<double> &force)
 {
   Matrix<12, 1> expected;
@@ -109,7 +109,7 @@ TEST(JointKernels, MultipliersOfAxesAreMoments)
   }
 }
 
-/* Antiparallel axes are the other branch of the same joint: closed, and with the same reactions */
+/* Antiparallel axes are another branch of the same constraint: it is satisfied there, with the same reactions */
 TEST(JointKernels, AlignmentsHaveTwoBranches)
 {
   Random random(4);
@@ -127,8 +127,8 @@ TEST(JointKernels, AlignmentsHaveTwoBranches)
   EXPECT_NEAR(misses, -0.5, 1e-12);
 }
 
-/* Shafts bent by a constant angle that turn by the same angle, however far, satisfy the row; those that do not turn
- * alike do not. */
+/* Shafts at a constant angle satisfy the constraint if they turn by the same angle, however large, and violate it if
+   they do not */
 TEST(JointKernels, ConstantVelocityTurnsBothShaftsAlike)
 {
   Random             random(5);
@@ -146,7 +146,7 @@ TEST(JointKernels, ConstantVelocityTurnsBothShaftsAlike)
     EXPECT_NEAR(phi, 0, 1e-14);
     EqualRotation<false>::value<double>({}, apart.f, 0, &phi);
     EXPECT_NEAR(phi, -std::sin(other) * std::pow(std::cos(bend / 2), 2), 1e-13);
-    /* moment about the axis halfway, of the shafts, whichever way z_i points */
+    /* The moment is about the bisector of the two shafts, whichever way z_i points */
     const Vec3<double> half       = (alike.f[0].R.col(2) + alike.j(2)).normalized();
     const Vec3<double> other_half = (away.j(2) - away.f[0].R.col(2)).normalized();
     ExpectMoment(Reaction<EqualRotation<false>>(alike, 0), std::cos(bend / 2) * half);
@@ -159,7 +159,7 @@ TEST(JointKernels, ConstantVelocityTurnsBothShaftsAlike)
 namespace
 {
 
-/* number of failures inside f, which are not reported */
+/* Number of failures inside f, which are intercepted instead of reported */
 int Failures(const std::function<void()> &f)
 {
   testing::TestPartResultArray results;
@@ -182,7 +182,7 @@ struct WrongCurvature : OnLine {
   static void curvature(const Empty &d, const Frame<double> *f, double t, const double *lambda, Hessian &H)
   {
     OnLine::curvature(d, f, t, lambda, H);
-    H(9, 10) = H(10, 9); /* turns do not commute */
+    H(9, 10) = H(10, 9); /* wrong, because rotations do not commute */
   }
 };
 struct WrongDepends : OnLine {
@@ -192,7 +192,7 @@ struct WrongCurved : OnLine {
   static constexpr bool curved(int a, int b) { return OnLine::curved(a, b) && a != b; }
 };
 
-/* spring and damper along the line between the markers, and the ways to get it wrong */
+/* A spring and damper along the line between the markers, with deliberate mistakes */
 enum Mistake { None, NoReaction, Undamped, Mask };
 template <Mistake mistake> struct Spring : Force<Spring<mistake>, 2, 1> {
   static constexpr const char *name    = "spring";
@@ -221,7 +221,7 @@ template <Mistake mistake> struct Spring : Force<Spring<mistake>, 2, 1> {
   }
 };
 
-/* a driven velocity row with an input, and one that is quadratic in the twists */
+/* A driven velocity-level constraint with an input, and one that is wrongly quadratic in the twists */
 template <bool quadratic> struct Drive : VelocityConstraint<Drive<quadratic>, 2, 1> {
   static constexpr const char *name   = "drive";
   static constexpr int         inputs = 1;

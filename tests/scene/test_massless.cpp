@@ -1,4 +1,5 @@
-/* Parts without mass or moments of inertia where joints determine them: the same motion as by a joint that stands for the part. */
+/* Bodies without mass or moments of inertia whose motion joints determine: the motion is that of a single joint in
+   their place */
 #include "hhtdae/analyses.h"
 #include "hhtdae/query.h"
 #include "scene_output.h"
@@ -19,7 +20,8 @@ RigidBody nothing(const Vector3 &at)
   return b;
 }
 
-/* Two masses, the upper one on a rail along x, 1 m apart by a rod without mass or by a point distance; the place of the lower one at the end */
+/* Two masses 1 m apart, connected by a massless rod or a point distance, the upper one on a rail along x; returns the
+   final position of the lower one */
 Vector3 onARail(bool part, double *tension)
 {
   Scene     s(PETSC_COMM_SELF, Space::Planar);
@@ -33,7 +35,7 @@ Vector3 onARail(bool part, double *tension)
   Element link;
   Marker  end = j;
   if (part) {
-    const Body rod = s.add("rod", nothing({0.3, 0, 0})); /* no place is special where there is no mass */
+    const Body rod = s.add("rod", nothing({0.3, 0, 0})); /* the initial position of a massless body is arbitrary */
     end            = s.markerAt(rod, {1, 0, 0});
     s.add("first", Revolute{s.markerAt(rod, Vector3::Zero()), i});
     link = s.add("second", Revolute{j, end});
@@ -54,7 +56,7 @@ Vector3 onARail(bool part, double *tension)
   return m.position;
 }
 
-/* A bob of 1 m on a universal joint, or on a cross without mass and two revolutes */
+/* A bob on an arm of 1 m, on a universal joint or on a massless cross and two revolutes */
 Vector3 onACross(bool part)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -88,7 +90,7 @@ TEST(Massless, RodAsAPointDistance)
   const Vector3 a = onARail(true, &tension[0]), b = onARail(false, &tension[1]);
   MEASURED("apart by %g, tension %.9g and %.9g", (a - b).norm(), tension[0], tension[1]);
   EXPECT_LT((a - b).norm(), 1e-5);
-  EXPECT_NEAR(tension[0], tension[1], 5e-3); /* of a weight of 20: a change of h shortly before the end leaves up to 2.5e-3, in some of ten tolerances near 1e-9 */
+  EXPECT_NEAR(tension[0], tension[1], 5e-3); /* of 20; changes of h shortly before the end cause up to 2.5e-3 at some tolerances near 1e-9 */
 }
 
 TEST(Massless, CrossAsAUniversalJoint)
@@ -98,8 +100,9 @@ TEST(Massless, CrossAsAUniversalJoint)
   EXPECT_LT((a - b).norm(), 1e-5);
 }
 
-/* A cross between two shafts 0.5 rad apart, of mass and moments far below theirs: tan b = cos 0.5 tan a. Two of its rows are redundant where the axes meet at right angles
-   in the start alone, which a neighbouring position tells. */
+/* A cross between two shafts at an angle of 0.5 rad, with mass and moments far below theirs: tan b = cos 0.5 tan a.
+   Where the axes meet at right angles, as at the start, two rows are dependent by accident; a neighbouring position
+   shows that they are not redundant */
 TEST(Massless, NextToNothing)
 {
   const double bend = 0.5;
@@ -138,7 +141,7 @@ TEST(Massless, NextToNothing)
     }
 }
 
-/* Thin rods on universal joints have nothing about their axes to be turned */
+/* Rods without moment of inertia about their axes, on universal joints that determine the rotation about the axis */
 TEST(Massless, RodsWithoutMomentAboutTheirAxes)
 {
   Vector3 end[2];
@@ -165,7 +168,7 @@ TEST(Massless, RodsWithoutMomentAboutTheirAxes)
   EXPECT_LT((end[0] - end[1]).norm(), 1e-5);
 }
 
-/* Nor do assembly and equilibrium need mass */
+/* Assembly and equilibrium work without mass */
 TEST(Massless, AssembledAndInEquilibrium)
 {
   Scene      s(PETSC_COMM_SELF, Space::Planar);

@@ -1,4 +1,4 @@
-/* Measures as arguments of expressions: their values, exact derivatives in the matrix of a scene, what is refused. */
+/* Measures as arguments of expressions: values, exact derivatives in the Jacobian of a scene, refused input */
 #include "scene_jacobian.h"
 
 using namespace hhtdae;
@@ -25,7 +25,7 @@ struct Mechanism {
   explicit Mechanism(Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
   {
     const bool flat         = space == Space::Planar;
-    scene.start().assembly  = Assembly::Off; /* any state will do */
+    scene.start().assembly  = Assembly::Off; /* assembly is off, since any state may be used */
     scene.start().redundant = Redundant::Keep;
     RigidBody one;
     one.mass = 2;
@@ -128,7 +128,7 @@ TEST_P(Both, DerivativesOfScalarsAndJoints)
   m.add(Expression{{Measure::value(v), Measure::force(m.spring, 0), Measure::multiplier(m.ball, 0)},
                    [](const Real *k) -> Real { return 1. / (2. + k[0] * k[0]) + k[1] * sin(k[2]); }});
   m.add(
-      Expression{{Measure::time(), Measure::value(Variable{(PetscInt)DataOf(m.scene).variables.size()})}, /* of itself */
+      Expression{{Measure::time(), Measure::value(Variable{(PetscInt)DataOf(m.scene).variables.size()})}, /* a variable that depends on itself */
                  [](const Real *k) -> Real { return k[0] + .1 * k[1] * k[1]; }});
   for (int c = 0; c < 3; c++)
     for (Marker frame : {Marker{}, m.on_ground, m.on_b})
@@ -154,7 +154,8 @@ TEST(Measures, DerivativesOfOtherReactions)
   EXPECT_LT(worstJacobian(m.scene), 1e-7);
 }
 
-/* A door on two hinges, five rows of which are redundant: those multipliers are zero, the hinges carry it together. */
+/* A door on two hinges with five redundant rows: the multipliers of dropped rows are zero, and the remaining reactions
+   carry the door */
 TEST(Measures, JointsWithRedundantRows)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -181,7 +182,7 @@ TEST(Measures, JointsWithRedundantRows)
   for (Variable v : all) zeros += state.definition(v) == 0;
   EXPECT_GE(zeros, 5);
   EXPECT_LT(zeros, (int)all.size());
-  /* all forces on the door are the hinges' */
+  /* the hinges are the only forces on the door */
   const Array    f     = state.residual();
   const PetscInt first = ModelOf(s).number.body[door.id];
   for (int c = 0; c < 3; c++) {
@@ -228,7 +229,8 @@ TEST_P(Both, DerivativesOfUserForces)
   }
 }
 
-/* A force that reads q'' is carried whether it was asked for or not: equations of motion stay affine in q''. */
+/* A force that depends on q'' becomes a force state even if this was not requested, so that the equations of motion
+   stay affine in q'' */
 TEST(Measures, ForcesOfAccelerationsAreCarried)
 {
   Mechanism     m;
@@ -245,7 +247,7 @@ TEST(Measures, ForcesOfAccelerationsAreCarried)
   EXPECT_EQ(n, 2);
 }
 
-/* Rates of displacements, velocities, distances and angles along any motion */
+/* Rates of displacements, velocities, distances and angles are their time derivatives along any motion */
 TEST_P(Both, RatesOfMeasures)
 {
   Mechanism             m(GetParam());
@@ -283,7 +285,8 @@ TEST_P(Both, RatesOfMeasures)
   EXPECT_LT(worst, 1e-7);
 }
 
-/* Components in a frame are the vector's in space turned into its axes; angles are those of the markers' axes. */
+/* Components in a frame are those of the vector in space rotated into the frame's axes; angles are those between the
+   markers' axes */
 TEST(Measures, ComponentsAndAngles)
 {
   Mechanism             m;
@@ -309,7 +312,7 @@ TEST(Measures, ComponentsAndAngles)
 namespace
 {
 
-/* what setUp() says about a scene */
+/* The error message of setUp() */
 template <class F> std::string refusal(F describe)
 {
   Mechanism m;

@@ -1,11 +1,11 @@
-/* Gears and racks with their force at the pitch point: derivatives, and the balance of every body from outputs alone */
+/* Gears and racks whose force acts at the pitch point: derivatives, and the balance of every body from outputs alone */
 #include "kernel_checks.h"
 #include "scene/kernels/mesh.h"
 #include "scene_output.h"
 #include "scene_start.h"
 
 using namespace hhtest;
-using hhtdae::Frame; /* tumbling.h has one, too */
+using hhtdae::Frame; /* tumbling.h has a Frame, too */
 
 namespace
 {
@@ -26,9 +26,9 @@ template <bool Rack> typename MeshRow<Rack>::Data RandomMesh(hhtdae::Random &ran
   return d;
 }
 
-/* What acts on a body: a joint's reaction, on its marker i's body, or its opposite on the other one */
+/* A load on a body: the reaction of a joint, on the body of its marker i, or the opposite on the other body */
 struct Load {
-  std::string force, moment, point; /* moment may be none; point: where the force acts, in channels of displacements */
+  std::string force, moment, point; /* names of channels; moment may be empty; point: where the force acts */
   double      sign;
 };
 
@@ -84,7 +84,7 @@ private:
   std::size_t row_;
 };
 
-/* Newton and Euler of a body whose inertia is a sphere's, about its centre of mass */
+/* The laws of Newton and Euler for a body with the inertia of a sphere, about its centre of mass */
 void ExpectBalance(const CSV &t, const std::string &body, double mass, double inertia, const Vector3 &gravity, const std::vector<Load> &loads)
 {
   double force = 0, moment = 0, scale = 0;
@@ -123,8 +123,8 @@ TEST(Mesh, Derivatives)
   CheckConstraint<MeshRow<true>>(RandomMesh<true>, 2);
 }
 
-/* Sun and planet on a carrier that turns itself, under gravity, with a brake on the planet; the force of the teeth stands at an
-   angle of pressure of 20 degrees, passes through the pitch point and leaves the carrier alone */
+/* Sun and planet on a carrier that turns, under gravity, with a brake on the planet. The force between the teeth has a
+   pressure angle of 20 degrees, passes through the pitch point and does not load the carrier */
 TEST(Mesh, WheelsOnATurningCarrier)
 {
   Machine       m;
@@ -150,7 +150,7 @@ TEST(Mesh, WheelsOnATurningCarrier)
   s.channel("brake", Measure::angularVelocity(on_planet, 2, at_planet));
   s.channel("tooth", Measure::multiplier(mesh, 0));
   const CSV t = run(m, 2, 0.0123);
-  /* brake and motor are couples about z, known from the outputs */
+  /* brake and motor are couples about z, known from outputs */
   double most = 0;
   for (std::size_t k = 0; k < t.row.size(); k++) {
     const Rows    r(t, k);
@@ -170,7 +170,7 @@ TEST(Mesh, WheelsOnATurningCarrier)
   const double last = sun_angle.back();
   MEASURED("wheels on a carrier: %.1f and %.1f turns, force of the teeth %.2f N, largest imbalance %.1e", last / 2 / M_PI,
            planet_angle.back() / 2 / M_PI, tooth.back(), most);
-  EXPECT_LT(most, 1e-4); /* of some 100 N, in samples between the steps */
+  EXPECT_LT(most, 1e-4); /* loads of about 100 N, at samples between steps */
   EXPECT_GT(std::abs(last), 15.);
   EXPECT_NEAR(planet_angle.back(), -2 * last, 1e-8 * std::abs(last)); /* radii 0.6 and 0.3 */
   EXPECT_GT(std::abs(tooth.back()), 5.);
@@ -186,7 +186,7 @@ TEST(Mesh, BevelGears)
                at_small = s.marker(s.ground(), {0.6, 0, 0.2}, axesAlong({1, 0, 0})), teeth = s.marker(s.ground(), {0.5, 0, 0}, axesAlong({0, 1, 0}));
   const Element b1 = s.add("b1", Revolute{on_big, at_big}), b2 = s.add("b2", Revolute{on_small, at_small}),
                 mesh = s.add("mesh", GearMesh{on_big, at_big, on_small, at_small, teeth});
-  s.add("motor", RotationalMotion{on_big, at_big, TimeFunction::polynomial({0, 0, 2})}); /* from rest */
+  s.add("motor", RotationalMotion{on_big, at_big, TimeFunction::polynomial({0, 0, 2})}); /* begins at rest */
   for (const auto &[name, e] : {std::pair{"b1", b1}, {"b2", b2}, {"mesh", mesh}}) m.reaction(name, e);
   m.point("teeth", teeth);
   m.point("at", at_small);
@@ -197,13 +197,13 @@ TEST(Mesh, BevelGears)
   const Array a = t.column("big angle"), b = t.column("small angle");
   EXPECT_NEAR(std::abs(b.back()), 2.5 * a.back(), 1e-7 * a.back());
   EXPECT_GT(a.back(), 15.);
-  /* 4 rad/s^2 and 2.5 times that on the small one: F = 0.05 * 10 / 0.2 */
+  /* 4 rad/s^2 on the large wheel and 2.5 times that on the small one: F = 0.05 * 10 / 0.2 */
   EXPECT_NEAR(std::abs(t.column("f.mesh1").back()), 2.5, 1e-6);
   EXPECT_NEAR(std::abs(t.column("f.b21").back()), 2.5, 1e-6);
 }
 
-/* A rack on a guide, its teeth at 20 degrees: the guide carries what is across its way. The same motion by a coupler, which loads
-   neither bearing nor guide. */
+/* A rack on a guide with a pressure angle of 20 degrees: the guide carries the force component across its direction. A
+   coupler produces the same motion without loading bearing and guide */
 TEST(Mesh, RackAndPinion)
 {
   const double pressure = 20 * M_PI / 180, r = 0.2;
@@ -242,7 +242,7 @@ TEST(Mesh, RackAndPinion)
       widen(motion, std::abs(t[0].column("angle")[k] - t[1].column("angle")[k]));
       widen(way, std::abs(t[0].column("angle")[k] * r - (a("x.rack")(0) - 0.1))); /* the pitch line is below the centre */
       widen(across, std::abs(F(1) - std::tan(pressure) * F(0)));
-      widen(guided, std::abs(a("f.guide")(1) - F(1))); /* the rack does not move across: guide and teeth balance */
+      widen(guided, std::abs(a("f.guide")(1) - F(1))); /* the rack does not move across the guide, so that the forces of guide and teeth balance */
       widen(lever, std::abs(a("f.bearing")(0) + F(0) - 2 * a("a.pinion")(0)) + std::abs(a("f.bearing")(1) + F(1) - 2 * a("a.pinion")(1)));
       EXPECT_NEAR(b("f.bearing").norm(), 0, 1e-7);
       EXPECT_NEAR(b("f.guide")(1), 0, 1e-7);

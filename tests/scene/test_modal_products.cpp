@@ -1,4 +1,4 @@
-/* Products and sums of a flexible body's quadratic invariants from their packed halves, against dense matrices. */
+/* Products and sums of a flexible body's quadratic invariants computed from their packed halves, against dense matrices */
 #include "scene/modal_products.h"
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@ namespace
 
 using Quadratic = std::array<Eigen::MatrixXd, 6>;
 
-/* The first three symmetric, their sum the identity or not */
+/* The first three are symmetric; their sum is the identity if `orthonormal` */
 Quadratic invariants(int m, bool orthonormal)
 {
   Quadratic N;

@@ -1,5 +1,4 @@
-/* Motions, screw and couplers as a scene takes them: what is refused and by which words, Jacobians, runs with known
- * solutions */
+/* Motions, screw and couplers in a scene: which input is refused with which message, Jacobians, runs with known solutions */
 #include "scene/kernels/angle.h"
 #include "scene_jacobian.h"
 #include "scene_output.h"
@@ -33,7 +32,7 @@ struct Parts {
 
   explicit Parts(Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
   {
-    scene.start().assembly = Assembly::Off; /* most of these scenes do not fit together */
+    scene.start().assembly = Assembly::Off; /* off, because most of these scenes are not assembled */
     const bool planar = space == Space::Planar;
     first             = scene.add("first", Block({.2, .1, 0}, planar ? AboutZ(.4) : Tilted()));
     second            = scene.add("second", Block({1, 2, 0}));
@@ -66,7 +65,7 @@ double JacobianError(Scene &scene, unsigned seed)
   return worst;
 }
 
-/* Pose of a body where the run has arrived */
+/* Pose of a body at the present time of the run */
 Frame<double> Pose(const SceneRun &run, Body body)
 {
   Vec                U, V;
@@ -111,7 +110,7 @@ TEST(MotionEntries, BadFunctionsAreNamed)
   ExpectSays(p.errors(RotationalMotion{p.i, p.ground, root}), "derivatives inf");
   ExpectSays(p.errors(RotationalMotion{p.i, p.ground, pole, MotionOf::Velocity}), "inf at the start, t = 0");
   EXPECT_EQ(p.errors(RotationalMotion{p.i, p.ground, root, MotionOf::Velocity}), "");
-  p.scene.start().time = 1; /* where it has begun before */
+  p.scene.start().time = 1; /* a motion that has begun before the start */
   EXPECT_EQ(p.errors(RotationalMotion{p.i, p.ground, root}), "");
   EXPECT_EQ(p.errors(RotationalMotion{p.i, p.ground, pole, MotionOf::Velocity}), "");
 }
@@ -121,7 +120,7 @@ TEST(MotionEntries, BadPairsAreNamed)
   Parts        p;
   Matrix3      sideways;
   const Marker twin = p.scene.marker(p.first, {0, 1, 0});
-  sideways << 0, 0, -1, 0, 1, 0, 1, 0, 0; /* x along the other's z */
+  sideways << 0, 0, -1, 0, 1, 0, 1, 0, 0; /* x is along the other marker's z */
   const Marker odd = p.scene.marker(p.second, {0, 0, 0}, sideways);
   ExpectSays(p.errors(RotationalMotion{p.i, Marker{}, kWave}), "marker j is not a marker");
   ExpectSays(p.errors(RotationalMotion{p.i, twin, kWave}), "both markers are on first");
@@ -188,8 +187,8 @@ TEST(MotionEntries, JacobiansInThePlane)
 
 /* ---- runs ---- */
 
-/* A nut off its axis, driven by 3 t + 10 t^2, by the velocity or by the acceleration of the same: two turns. The drive
-   accelerates the nut about z and, by the thread, along it, against gravity. */
+/* A nut off its axis makes two turns, driven by 3 t + 10 t^2 as displacement, velocity or acceleration. The drive
+   accelerates the nut about z and, by the thread, along z against gravity */
 TEST(MotionEntries, AScrewDrivenInThreeWays)
 {
   const double       pitch = .1, lead = pitch / kTurn, speed = 3, mass = 2, gravity = 9.81;
@@ -221,8 +220,8 @@ TEST(MotionEntries, AScrewDrivenInThreeWays)
   }
 }
 
-/* Two wheels with different axes in space, ratio 2.5: the first makes six turns, the second as many over the ratio,
- * backwards */
+/* Two wheels with different axes in space and the ratio 2.5: the first makes six turns, the second six turns over the
+   ratio, backwards */
 TEST(MotionEntries, AGearOverManyTurns)
 {
   Scene         scene(PETSC_COMM_SELF);
@@ -243,8 +242,8 @@ TEST(MotionEntries, AGearOverManyTurns)
   MEASURED("gear: wheels at 40 and -16 rad to %.1e and %.1e", d1, d2);
 }
 
-/* Without an axis a motion drives what Translational guides: along z_j in space, along x_j in the plane. s = t^2 by the displacement,
-   by the velocity or by the acceleration of the same; the multiplier is the force on the block, 2 times its mass. */
+/* A translational motion without an axis acts along the guide of Translational: z_j in space, x_j in the plane. s =
+   t^2 as displacement, velocity or acceleration; the multiplier is the force on the block, 2 times its mass */
 TEST(MotionEntries, ATranslationWithoutAnAxisIsAlongItsGuide)
 {
   const TimeFunction function[] = {TimeFunction::polynomial({0, 0, 1}), TimeFunction::polynomial({0, 2}), 2.};
@@ -273,7 +272,7 @@ void RackFalls(Space space)
 {
   const double  m = 2, I = .3, r = .25, g = 9.81, a = g * m / (m + I / (r * r)), t = 1.5;
   const bool    planar = space == Space::Planar;
-  Matrix3       down; /* the guide's direction, x in the plane and z in space, along -y */
+  Matrix3       down; /* the direction of the guide (x in the plane, z in space) is along -y */
   Scene         scene(PETSC_COMM_SELF, space);
   const Vector3 place(.25, 0, 0);
   if (planar)
@@ -296,7 +295,7 @@ void RackFalls(Space space)
   EXPECT_LT(dx, 1e-6);
   EXPECT_LT(dR, 1e-6);
   EXPECT_NEAR(Multiplier(scene, run, mesh), -m * (g - a),
-              1e-4 * m * g); /* it holds the rack back, against the guide's direction */
+              1e-4 * m * g); /* the pinion's force opposes the rack's motion */
   MEASURED("rack: position to %.1e of %.2f, pinion to %.1e, force %.6f of %.6f", dx, fall, dR,
            Multiplier(scene, run, mesh), -m * (g - a));
 }
@@ -329,7 +328,7 @@ TEST(MotionEntries, ADifferentialOfThreeWheels)
   EXPECT_LT((Pose(run, wheel[2]).R - AboutZ(7.5)).norm(), 1e-7);
 }
 
-/* A drive whose function ends in the middle of the run is an error, not a result */
+/* A drive whose function ends in the middle of the run leads to an error, not to a result */
 TEST(MotionEntries, AFunctionThatEndsStopsTheRun)
 {
   Scene        scene(PETSC_COMM_SELF, Space::Planar);

@@ -1,5 +1,4 @@
-/* Angles, advances and motions of them: derivatives, full turns, one motion described by its displacement and by its
- * velocity */
+/* Angles, displacements and motions: derivatives, full turns, and one motion given by its displacement and by its velocity */
 #include "kernel_checks.h"
 #include "scene/kernels/angle.h"
 #include "scene/kernels/motion.h"
@@ -11,7 +10,7 @@ namespace
 
 const TimeFunction kDrive = TimeFunction::harmonic(.7, 2, .3, .1);
 
-/* two frames between which the angle is well defined: curvature grows like 1/sin^2 of the angle between x_i and z_j */
+/* Keeps the two frames where the angle is well defined: the curvature grows like 1/sin^2 of the angle between x_i and z_j */
 void Separate(Random &random, Frame<double> *f)
 {
   while (std::abs(f[0].R.col(0).dot(f[1].R.col(2))) > .9) f[0].R = random.rotation();
@@ -28,7 +27,7 @@ std::function<MotionData(Random &)> Along(int axis)
   return [axis](Random &) { return MotionData{kDrive, axis}; };
 }
 
-/* Frames that move and turn smoothly in time, and their exact twists */
+/* Frames that move and rotate smoothly in time, with their exact twists */
 struct Flight {
   Vec3<double> x, v, a, axis, w;
   Mat3<double> R;
@@ -45,7 +44,7 @@ struct Flight {
   Twist<double> twist(double t) const { return {v + t * a, w}; }
 };
 
-/* j in a general pose, i turned about its z axis and moved along it */
+/* j in a general pose; i is rotated about j's z axis and displaced */
 Frame<double> Turned(const Frame<double> &j, double angle, const Vec3<double> &moved = Vec3<double>::Zero())
 {
   return {j.x + j.R * moved, j.R * Eigen::AngleAxisd(angle, Vec3<double>::UnitZ()).toRotationMatrix()};
@@ -80,7 +79,7 @@ TEST(Angle, CountsFullTurnsBothWays)
   }
 }
 
-/* a turn more or less has the same derivatives */
+/* adding full turns does not change the derivatives */
 TEST(Angle, UnwindingKeepsDerivatives)
 {
   using T = Dual<1>;
@@ -139,7 +138,7 @@ TEST(MotionKernels, DrivenVelocity)
   for (int axis = 0; axis < 3; axis++) CheckVelocityConstraint<DrivenVelocity>(Along(axis), 20 + axis);
 }
 
-/* the state that carries the speed enters as a further unknown */
+/* the state that gives the velocity is an additional input */
 TEST(MotionKernels, RatesOfAState)
 {
   CheckVelocityConstraint<StateAngularVelocity>(Turning, 30);
@@ -149,7 +148,7 @@ TEST(MotionKernels, RatesOfAState)
 namespace
 {
 
-/* what the kernels' own gradient and curvature replace */
+/* Compares with the automatic derivatives, which the kernels replace by their own gradient and curvature */
 template <class K> void CompareWithAutomaticRate(unsigned seed)
 {
   using Automatic = VelocityConstraint<K, 2, 1>;
@@ -184,7 +183,8 @@ TEST(MotionKernels, RateRowsAgreeWithAutomaticDifferentiation)
   CompareWithAutomaticRate<StateVelocity>(43);
 }
 
-/* The velocity row is d/dt of the displacement row of the integral, along any motion of the frames. */
+/* The velocity constraint is the time derivative of the displacement constraint of the integral, along any motion of
+   the frames */
 TEST(MotionKernels, VelocityRowIsTheTimeDerivativeOfTheDisplacementRow)
 {
   const TimeFunction rate = TimeFunction::values([](double t) {
@@ -213,7 +213,7 @@ TEST(MotionKernels, VelocityRowIsTheTimeDerivativeOfTheDisplacementRow)
   }
 }
 
-/* A drive of many turns is met where the angle is f(t) modulo 2 pi, at any time, without a history. */
+/* A driven angle of many turns is satisfied where the angle is f(t) modulo 2 pi, at any time and without a history */
 TEST(MotionKernels, DrivenAngleFollowsManyTurns)
 {
   Random              random(9);
@@ -244,7 +244,7 @@ TEST(MotionKernels, AFunctionWithoutValueShows)
   for (double x : phi) EXPECT_TRUE(std::isnan(x));
 }
 
-/* -J^T lambda on i's body is the multiplier about z_j, or along the axis */
+/* -J^T lambda on i's body is the multiplier as moment about z_j, or as force along the axis */
 TEST(MotionKernels, TheMultiplierIsTheDrive)
 {
   Random              random(12);

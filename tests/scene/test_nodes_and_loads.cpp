@@ -1,5 +1,5 @@
-/* Kept nodes of flexible bodies as places for markers, load cases times functions, the ground's acceleration: Jacobians against differences, motions and loads
-   against the particles that the body is made of. */
+/* Kept nodes of flexible bodies as places for markers, load cases scaled by functions, acceleration of the ground:
+   Jacobians against differences; motions and loads against the particles that form the body */
 #include "hhtdae/query.h"
 #include "modal_cloud.h"
 #include "scene/model.h"
@@ -79,7 +79,7 @@ TEST(NodesAndLoads, JacobianAgainstDifferences)
   }
 }
 
-/* The load case of forces on all particles is those forces one by one, in any state */
+/* The load case of forces on all particles gives the same residual as separate forces on the particles, in any state */
 TEST(NodesAndLoads, ALoadCaseIsItsForces)
 {
   Array F[2];
@@ -89,7 +89,7 @@ TEST(NodesAndLoads, ALoadCaseIsItsForces)
     FlexibleBody     b = flexible(c);
     b.rotation         = tilted;
     const Body body    = scene.add("body", b);
-    for (std::size_t p = 0; p < c.X.size(); p++) { /* axes of nodes without rotation are those of the body */
+    for (std::size_t p = 0; p < c.X.size(); p++) { /* nodes without rotation have the axes of the body */
       UserForce f;
       f.i     = scene.marker(scene.node(body, 10 + 3 * (PetscInt)p));
       f.frame = scene.marker(scene.node(body, 10));
@@ -104,7 +104,7 @@ TEST(NodesAndLoads, ALoadCaseIsItsForces)
   for (std::size_t i = 0; i < F[0].size(); i++) EXPECT_NEAR(F[0][i], F[1][i], 1e-11 * (1 + std::abs(F[0][i])));
 }
 
-/* A marker at a node is where the particle is */
+/* A marker at a node has the position of the particle */
 TEST(NodesAndLoads, MarkersFollowTheirParticles)
 {
   const ModalCloud c = withNodes(4, 3);
@@ -160,7 +160,7 @@ TEST(NodesAndLoads, RefusedByName)
   says(trap.message, "nodes or loads with another number of modes");
 }
 
-/* Loads and components are read as those of any other force; the scale may be another one in the next run */
+/* Loads and components of load cases are read like those of any other force; the scale may change in the next run */
 TEST(NodesAndLoads, QueriesAndParameters)
 {
   const ModalCloud c = withNodes(4, 3);
@@ -184,7 +184,7 @@ TEST(NodesAndLoads, QueriesAndParameters)
   }
 }
 
-/* Loads and contacts of a flexible body that a parameter takes away, beside a marker that was made after them */
+/* Loads and contacts of a flexible body that a parameter removes, with a marker that was made after them */
 TEST(NodesAndLoads, ThatMayBeMissing)
 {
   Scene           scene(PETSC_COMM_SELF);
@@ -231,7 +231,8 @@ TEST(NodesAndLoads, ABodyWithoutMass)
 namespace
 {
 
-/* A flexible body with a rigid one on a hinge, fixed to a base that moves as its acceleration has it, or to ground that accelerates */
+/* A flexible body with a rigid body on a hinge, fixed either to a base whose motion has the given acceleration, or to
+   ground that accelerates */
 Array shaken(bool ground)
 {
   Scene        scene(PETSC_COMM_SELF);
@@ -264,7 +265,7 @@ Array shaken(bool ground)
   scene.add("foot", Fixed{foot, on});
   for (int k = 0; k < 4; k++) scene.channel(text("eta%d", k), Measure::modal(beam, k));
   for (int c = 0; c < 3; c++) scene.channel(text("x%d", c), Measure::displacement(scene.marker(hanging), c, on));
-  scene.start().tolerance = 1e-3; /* the deformed attachment's axes */
+  scene.start().tolerance = 1e-3; /* the axes of the deformed attachment differ by this much */
   SceneRun run(scene, 0.8, tolerance(1e-10) + " -ts_hhtdae_corrector_tolerance 1e-8 ");
   Array    x;
   must(run.solve());
@@ -290,7 +291,7 @@ TEST(NodesAndLoads, GroundAccelerationIsAMovingBase)
 namespace
 {
 
-/* No node has a rotation, so that a frame at a node turns as the ball of a contact does */
+/* No node has a rotation, so that a frame at a node rotates with the body, like the ball of a contact */
 FlexibleBody plainNodes(int modes, unsigned seed)
 {
   ModalCloud c = withNodes(modes, seed);
@@ -303,7 +304,8 @@ FlexibleBody plainNodes(int modes, unsigned seed)
 
 enum class Other { Ground, Part, Attachment };
 
-/* Nodes of a flexible body against a plane or a sphere, as one element or one by one; loads of the one element are asked for by the caller */
+/* Nodes of a flexible body against a plane or a sphere, described as one element or node by node; the caller adds the
+   loads of the single element */
 void describeTouching(Scene &scene, Other other, bool sphere, bool single)
 {
   FlexibleBody b = plainNodes(4, 11), d = plainNodes(3, 21);
@@ -391,7 +393,7 @@ TEST(NodeContact, RefusedByName)
   says(touch([](NodeContact &c, Scene &) { c.law.stiffness = 0; }), "node contact touch: stiffness is 0");
 }
 
-/* A bounce without damping or friction keeps energy, and its resultant is read as any other element's */
+/* A bounce without damping or friction conserves energy, and its resultant is read like the load of any other element */
 TEST(NodeContact, ABounceKeepsEnergy)
 {
   double drift[2], impulse = 0;
@@ -419,7 +421,7 @@ TEST(NodeContact, ABounceKeepsEnergy)
     impulse = pz.back() - pz.front();
   }
   MEASURED("drift of energy %.2e, %.2e; impulse %.3f", drift[0], drift[1], impulse);
-  EXPECT_GT(impulse, 10); /* it has come back */
+  EXPECT_GT(impulse, 10); /* the body has come back */
   EXPECT_LT(drift[1], 2e-3);
   EXPECT_LT(drift[1], 0.35 * drift[0]);
 }

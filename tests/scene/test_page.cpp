@@ -1,4 +1,4 @@
-/* The page of a run: what it holds is what the run had. */
+/* The page of a run contains the values that the run had */
 #include "hhtdae/query.h"
 #include "modal_cloud.h"
 #include "scene/output/page_frames.h"
@@ -14,7 +14,7 @@ namespace
 
 const std::string accurate = " -ts_rtol 1e-7 -ts_atol 1e-7 ";
 
-/* What queries say of the bodies at the times of the frames */
+/* Poses of the bodies from queries at the times of the frames */
 struct Asked {
   std::vector<Body>                      body;
   Body                                   flexible; /* none by default */
@@ -45,14 +45,14 @@ struct Asked {
   }
 };
 
-/* Attitude from the quaternion of a track, at most half a level away from one of length 1 */
+/* Attitude from the quaternion of a track; quantization may change its length from 1 by half a level */
 Matrix3 axesOf(const std::vector<double> &track, std::size_t body)
 {
   const double *q = &track[7 * body + 3];
   return Eigen::Quaterniond(q[3], q[0], q[1], q[2]).toRotationMatrix();
 }
 
-/* The largest difference from what was asked, in half levels */
+/* Largest difference from the queried values, in half levels of quantization */
 void comparePoses(const PageFile &page, const Asked &asked)
 {
   ASSERT_EQ(page.time.size(), asked.time.size());
@@ -93,7 +93,7 @@ TEST(Page, PosesAndChannelsAreThoseOfTheRun)
   Asked         asked{rods.body, {}, 0.01};
   asked.scene = &rods.scene;
   rods.scene.channel("y", Measure::displacement(rods.tip[2], 1), "m");
-  rods.scene.channel("pin", Measure::jointForce(rods.pin[1], 1), "N"); /* it follows from the equations of motion */
+  rods.scene.channel("pin", Measure::jointForce(rods.pin[1], 1), "N"); /* the reaction follows from the equations of motion */
   SceneRun run(rods.scene, 2, accurate + "-scene_page_dt 0.01 -scene_page " + file.name);
   must(TSMonitorSet(run.ts, Asked::ask, &asked, nullptr));
   must(run.solve());
@@ -113,7 +113,7 @@ TEST(Page, FiveHundredFramesUnlessAskedOtherwise)
     must(run.solve());
     const PageFile page(file.text(), 14, 0);
     EXPECT_EQ(page.time.size(), frames) << option;
-    EXPECT_LT(file.text().size(), 1200000u); /* most of it is three.js */
+    EXPECT_LT(file.text().size(), 1200000u); /* most of the page is three.js */
   }
 }
 
@@ -152,7 +152,7 @@ TEST(Page, FlexibleBodies)
     EXPECT_NEAR(s.point[i], cloud.X[i / 3](i % 3), 1e-6);
     for (int k = 0; k < 5; k++) EXPECT_NEAR(s.mode[k][i], cloud.shape(i, k), 0.51 * s.step[k]);
   }
-  for (int k = 0; k < 5; k++) { /* coarser by the square of the frequency */
+  for (int k = 0; k < 5; k++) { /* resolution is coarser by the square of the frequency */
     const double ratio = cloud.body.omega(0) / cloud.body.omega(k);
     EXPECT_NEAR(s.step[k], cloud.shape.col(k).cwiseAbs().maxCoeff() / (8191 * ratio * ratio), 1e-2 * s.step[k]);
   }
@@ -172,7 +172,7 @@ TEST(Page, FlexibleBodies)
   }
 }
 
-/* Where the frames of attachments are without deformation: of a body that is deformed at the start, and whose origin is not its centre of mass */
+/* Undeformed frames of attachments, for a body that is deformed at the start and whose origin is not its centre of mass */
 TEST(Page, AttachmentsWithoutDeformation)
 {
   TemporaryFile file("attachments.html");
@@ -245,7 +245,7 @@ TEST(Page, NamesCannotBreakThePage)
   EXPECT_GT(page.time.size(), 1u);
 }
 
-/* What is not finite keeps its place, and spoils nothing beside it */
+/* Values that are not finite keep their places and do not affect their neighbours */
 TEST(Page, ValuesOfAllKinds)
 {
   const double nan = std::numeric_limits<double>::quiet_NaN(), huge = 0.9e300, infinite = std::numeric_limits<double>::infinity();
@@ -304,7 +304,7 @@ TEST(Page, FilesThatCannotBeWritten)
   EXPECT_EQ(attempt("-scene_page /dev/null"), "");
 }
 
-/* A run that fails before its first frame leaves the page of the run before */
+/* A run that fails before its first frame leaves the page of an earlier run in place */
 TEST(Page, IsReplacedWhenItIsWhole)
 {
   TemporaryFile file("old.html");
@@ -326,7 +326,7 @@ TEST(Page, IsReplacedWhenItIsWhole)
   EXPECT_EQ(PageFile(file.text(), 7, 0).time.size(), 501u);
 }
 
-/* A scene without bodies is refused by setUp() */
+/* The smallest scene: one without bodies is refused by setUp() */
 TEST(Page, TheLeastScene)
 {
   TemporaryFile file("least.html");
@@ -337,7 +337,8 @@ TEST(Page, TheLeastScene)
   EXPECT_EQ(PageFile(file.text(), 7, 0).time.size(), 5u);
 }
 
-/* Frames and blocks of a run that was broken off and resumed are those of the run in one go, but for where blocks end */
+/* Frames and blocks of a run that was interrupted and resumed are those of the uninterrupted run, except for the
+   limits of blocks */
 TEST(Page, ResumedRunsGoOn)
 {
   TemporaryFile     whole("whole.html"), broken("broken.html"), checkpoint("page.checkpoint");
@@ -360,7 +361,7 @@ TEST(Page, ResumedRunsGoOn)
     EXPECT_EQ(a.channel[i], b.channel[i]);
     for (std::size_t k = 0; k < 14; k++) EXPECT_NEAR(a.track[i][k], b.track[i][k], 0.51 * (a.step[i][k] + b.step[i][k]));
   }
-  /* its file gone: it begins where the run goes on */
+  /* after its file has been deleted the page begins where the run resumes */
   std::remove(broken.name.c_str());
   go(broken.name, write + "-ts_max_steps 27");
   std::remove(broken.name.c_str());
@@ -382,7 +383,8 @@ TEST(Page, DescribesTheScene)
   const std::string s = PageFile(file.text(), 14, 0).scene;
   EXPECT_NE(s.find("\"planar\":false,\"up\":[0,1,0]"), std::string::npos) << s;
   EXPECT_NE(s.find("{\"kind\":\"box\",\"size\":[0.5,0.1,0.1],\"at\":[0,0,0,0,0,0,0,1],\"colour\":3368601}"), std::string::npos) << s;
-  /* the second rod's shape is the box with its mass and inertia, of which 1.5 (1/6 + 0.01 - 2/12) is the square of the short half edges */
+  /* the second rod's shape is guessed: the box with its mass and inertia; 1.5 (1/6 + 0.01 - 2/12) is the square of its
+     short half edges */
   EXPECT_NE(s.find("\"guess\":true"), std::string::npos) << s;
   EXPECT_NE(s.find("0.122474487139"), std::string::npos) << s;
   EXPECT_NE(s.find("{\"name\":\"pin0\",\"type\":\"revolute\",\"kind\":\"joint\",\"i\":[0,-0.5,0,0,0,0,0,1],\"j\":[-1,0,0,0,0,0,0,1]}"), std::string::npos) << s;

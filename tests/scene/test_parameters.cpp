@@ -1,4 +1,4 @@
-/* Parameters: other numbers without another description. */
+/* Parameters: other values without a new description */
 #include "hhtdae/linearize.h"
 #include "hhtdae/query.h"
 #include "scene_output.h"
@@ -9,7 +9,7 @@ using namespace hhtest;
 namespace
 {
 
-/* A block on a guide, on a spring from the ground; the spring's free length is the distance at the start */
+/* A block on a guide with a spring from the ground; the spring's free length is the initial distance */
 struct Block {
   Scene     scene{PETSC_COMM_SELF};
   Parameter stiffness, mass, reach;
@@ -64,7 +64,7 @@ TEST(Parameters, TheNextRunHasThem)
   EXPECT_NEAR(b.after(0.3), sine(400, 4, 0.3), 1e-5);
 }
 
-/* What was computed from the description follows: the free length of the spring is the new distance */
+/* Values computed from the description follow the parameters: the free length of the spring is the new distance */
 TEST(Parameters, WhatFollowsFromThemFollows)
 {
   Block  b;
@@ -75,7 +75,7 @@ TEST(Parameters, WhatFollowsFromThemFollows)
   EXPECT_NEAR(std::abs(force), 100 * z, 1e-4);
 }
 
-/* The same numbers as a scene that was described with them */
+/* A run after a change has the same digits as that of a scene described with the new value */
 TEST(Parameters, TheSameDigitsAsDescribed)
 {
   Block b;
@@ -90,7 +90,8 @@ TEST(Parameters, TheSameDigitsAsDescribed)
   EXPECT_EQ(b.after(0.4), first.after(0.4));
 }
 
-/* Gravity that was given before the first parameter stays when one changes; what else came before is refused */
+/* Gravity given before the first parameter is kept when the parameter changes; everything else given before the first
+   parameter is refused */
 TEST(Parameters, WhatCameBeforeTheFirst)
 {
   Scene scene(PETSC_COMM_SELF);
@@ -120,7 +121,7 @@ TEST(Parameters, WhatCameBeforeTheFirst)
   }
 }
 
-/* Runs that were begun before keep theirs, side by side with later ones */
+/* Runs made earlier keep their values, side by side with later runs */
 TEST(Parameters, ARunKeepsItsOwn)
 {
   Block               b;
@@ -139,7 +140,7 @@ TEST(Parameters, ARunKeepsItsOwn)
   EXPECT_NEAR(x[0], sine(400, 1, 0.3), 1e-5);
 }
 
-/* An element that is there or not; its loads are zero where it is not, and other handles stay good */
+/* An element that a parameter can remove: its loads are zero when it is absent, and other handles stay valid */
 TEST(Parameters, AnElementThatMayBeMissing)
 {
   Scene           scene(PETSC_COMM_SELF);
@@ -191,7 +192,7 @@ TEST(Parameters, RedundantConstraintsAreToldOnce)
   EXPECT_EQ(told(1, 0), "");
 }
 
-/* Handles are numbers: those of markers that come after one that is missing would stand for others */
+/* Handles are numbers: if an absent element did not make its markers, the handles of later markers would refer to others */
 TEST(Parameters, MarkersOfAnElementThatMayBeMissing)
 {
   Scene           s(PETSC_COMM_SELF);
@@ -203,7 +204,7 @@ TEST(Parameters, MarkersOfAnElementThatMayBeMissing)
   TS ts;
   must(s.createTS(&ts));
   must(TSDestroy(&ts));
-  must(s.set("on", 2)); /* there with another value: nothing changes */
+  must(s.set("on", 2)); /* present with another value: nothing changes */
   must(s.createTS(&ts));
   must(TSDestroy(&ts));
   must(s.set("on", 0));
@@ -212,7 +213,8 @@ TEST(Parameters, MarkersOfAnElementThatMayBeMissing)
   EXPECT_TRUE(trap.says("spring: its function makes other markers")) << trap.message;
 }
 
-/* A function of the state that holds a parameter reads it at every evaluation: a controller between steps */
+/* A function of the state that contains a parameter reads its value at every evaluation, for example a controller that
+   changes it between steps */
 TEST(Parameters, AFunctionReadsThePresentValue)
 {
   Scene           scene(PETSC_COMM_SELF);
@@ -235,8 +237,8 @@ TEST(Parameters, AFunctionReadsThePresentValue)
   EXPECT_NEAR(x[0], 1.5, 1e-9);
 }
 
-/* At the present time of a run whose parameters or velocities have been changed since its last step: forces, accelerations and reactions are those of a start from there. A mass on
-   a link of length 1 is pulled along it */
+/* Forces, accelerations and reactions at the present time, after parameters or velocities have been changed since the
+   last step, are those of a start from this state. A mass on a link of length 1 is pulled along it */
 TEST(Parameters, TheStateAfterAChangeIsOne)
 {
   const double g = 9.81;
@@ -288,7 +290,7 @@ TEST(Parameters, TheStateAfterAChangeIsOne)
       must(small.modes(&modes));
       for (const Mode &each : modes) fastest = std::max(fastest, std::abs(each.value));
       EXPECT_NEAR(fastest, std::sqrt(tension), 1e-5);
-      must(TSSetMaxTime(run.ts, 1.1)); /* the run goes on */
+      must(TSSetMaxTime(run.ts, 1.1)); /* the run continues */
       must(run.solve());
       must(scene.sample(run.ts, 1.1, x));
       EXPECT_NEAR(std::abs(x[0]), tension, 1e-6);
@@ -307,7 +309,7 @@ TEST(Parameters, SayWhatIsWrong)
   TS ts;
   EXPECT_NE(b.scene.createTS(&ts), 0);
   EXPECT_TRUE(trap.says("mass is -1, must be positive")) << trap.message;
-  must(b.scene.set("mass", 2)); /* and goes on */
+  must(b.scene.set("mass", 2)); /* and is usable again */
   EXPECT_NEAR(b.after(0.3), sine(100, 2, 0.3), 1e-6);
   Scene late(PETSC_COMM_SELF);
   late.add("body", PointMass());
@@ -316,8 +318,9 @@ TEST(Parameters, SayWhatIsWrong)
   EXPECT_TRUE(trap.says("parameter k: it came too late")) << trap.message;
 }
 
-/* A checkpoint goes on with the values it was written with, of elements and of functions, or names the parameter: the spring is slack where it is written, so
-   that the residual tells nothing */
+/* A checkpoint can be resumed only with the parameter values with which it was written, both of elements and of
+   functions; otherwise the error names the parameter. The stop is open when the checkpoint is written, so that the
+   residual does not show its stiffness */
 TEST(Parameters, OfCheckpoints)
 {
   const TemporaryFile file("parameters.checkpoint");
@@ -348,7 +351,7 @@ TEST(Parameters, OfCheckpoints)
     });
 }
 
-/* A mass tells scenes of checkpoints apart; as a parameter it is named */
+/* Different masses distinguish the scenes of checkpoints; if the mass is a parameter, the error names it */
 TEST(Parameters, OfCheckpointsInMasses)
 {
   const TemporaryFile file("masses.checkpoint");

@@ -1,4 +1,5 @@
-/* What would act on a point mass with a moment, or turn with it, is refused by name: there is nothing that could take it. */
+/* Elements that would apply a moment to a point mass, or rotate with it, are refused by name, since a point mass has
+   no rotation */
 #include "hhtdae/scene.h"
 #include "support.h"
 
@@ -8,7 +9,7 @@ using namespace hhtdae;
 namespace
 {
 
-/* A point mass, a block and the ground, each with a marker; x is up to the test */
+/* A point mass, a block and the ground, each with a marker; tests choose the position */
 struct Bead {
   Scene  scene;
   Marker bead, block, ground;
@@ -29,7 +30,7 @@ struct Bead {
   }
 };
 
-/* The error of a scene with one element, empty if there is none */
+/* The error of a scene with this one element; empty if there is none */
 template <class Spec> std::string with(const std::function<Spec(Bead &)> &spec, Space space = Space::Spatial)
 {
   Bead b(space);
@@ -70,7 +71,7 @@ TEST(PointMasses, MomentsAreRefused)
   TAKES(SpringDamper, {f.bead, f.block, 3, 1});
 }
 
-/* A force at i whose reaction acts at the same point, or along an axis of j */
+/* A force at i whose reaction acts at i's position, or along an axis of j, would apply a moment to j */
 TEST(PointMasses, ReactionsOffTheirOriginAreRefused)
 {
   REFUSES(UserForce, "j", {f.block, f.bead, {}, three, {}});
@@ -93,7 +94,7 @@ TEST(PointMasses, ContactsWithAMomentAreRefused)
   TAKES(SphereBox, {f.bead, f.block, 0.1, {0.1, 0.1, 0.1}});
 }
 
-/* The row's derivative by the rotation of the point mass would be a moment on it */
+/* The derivative of the constraint with respect to the rotation of the point mass would be a moment on it */
 TEST(PointMasses, UserConstraintsThatTurnWithOneAreRefused)
 {
   const auto row = [](const Measure &m) { return UserConstraint{{Expression{{m}, [](const Real *x) { return x[0] - x[0].value(); }}}}; };

@@ -1,4 +1,4 @@
-/* Questions to a run, against what is known of the motion and against channels. */
+/* Snapshots of a run, compared with the known motion and with channels */
 #include "hhtdae/query.h"
 #include "scene_output.h"
 #include <cmath>
@@ -8,7 +8,7 @@ using namespace hhtest;
 namespace
 {
 
-/* A rod that swings about a pin on a turning disc, with a spring to the ground: every kind of motion and load */
+/* A rod on a pin on a turning disc, with a spring to the ground: contains every kind of motion and load */
 struct Machine {
   Scene    scene;
   Body     disc, rod;
@@ -77,7 +77,7 @@ void expectNear(const Vector3 &a, const Vector3 &b, double tolerance) { EXPECT_L
 
 } // namespace
 
-/* Every measure says the same as its channel, between steps and at their ends, while the winder turns more than once */
+/* Every measure equals its channel, between steps and at their ends, while the winder turns more than once */
 TEST(Query, MeasuresAgreeWithChannels)
 {
   Machine m;
@@ -101,7 +101,8 @@ TEST(Query, MeasuresAgreeWithChannels)
   }
 }
 
-/* Two balls that start at one place and part at 3 m/s: their distance has no rate there, and what is asked for is a number all the same */
+/* Two balls start at the same position and separate with 3 m/s: at the start their distance has no derivative, and the
+   rate must be finite nevertheless */
 TEST(Query, RateOfMarkersThatCoincide)
 {
   Scene      scene(PETSC_COMM_SELF);
@@ -123,7 +124,8 @@ TEST(Query, RateOfMarkersThatCoincide)
   EXPECT_NEAR(x, 3, 1e-12);
 }
 
-/* Velocities and accelerations are the rates of positions and velocities, seen from space and from a moving marker */
+/* Velocities and accelerations are the time derivatives of positions and velocities, relative to space and to a moving
+   marker */
 TEST(Query, MotionIsTheRateOfMotion)
 {
   Machine  m;
@@ -149,11 +151,11 @@ TEST(Query, MotionIsTheRateOfMotion)
   }
 }
 
-/* Newton and Euler of the rod: m a and the rate of the angular momentum from all loads */
+/* The laws of Newton and Euler for the rod: m a and the rate of the angular momentum equal the sum of all loads */
 TEST(Query, LoadsMakeTheMotion)
 {
   Machine  m;
-  SceneRun run(m.scene, 2, tolerance(1e-8) + "-ts_hhtdae_corrector_tolerance 1e-6"); /* which is what the step leaves of its equations */
+  SceneRun run(m.scene, 2, tolerance(1e-8) + "-ts_hhtdae_corrector_tolerance 1e-6"); /* the residual that a step may leave */
   must(run.solve());
   Snapshot now;
   must(now.take(run.ts));
@@ -175,10 +177,10 @@ TEST(Query, LoadsMakeTheMotion)
   expectNear(on_i.force, -on_j.force, 1e-9);
   EXPECT_GT(on_i.force.norm(), 1);
   must(now.load(m.spring, m.hub, &on_i));
-  EXPECT_EQ(on_i.force.norm(), 0); /* it does not touch the disc */
+  EXPECT_EQ(on_i.force.norm(), 0); /* the element is not connected to the disc */
 }
 
-/* A channel may be any function of measures, energies among them */
+/* A channel may be any function of measures, including energies */
 TEST(Query, AnExpressionAsChannel)
 {
   Machine m;
@@ -214,7 +216,7 @@ TEST(Query, Angles)
     m.axes = about(a(0), Vector3::UnitX()) * about(a(1), Vector3::UnitY()) * about(a(2), Vector3::UnitZ());
     expectNear(m.bryant(), a, 1e-12);
   }
-  for (double sign : {1., -1.}) { /* at the singularities the attitude is right all the same */
+  for (double sign : {1., -1.}) { /* also at the singularities the attitude is right */
     Motion m;
     m.axes << std::cos(0.4), -std::sin(0.4), 0, sign * std::sin(0.4), sign * std::cos(0.4), 0, 0, 0, sign;
     Vector3 e = m.euler();
@@ -244,7 +246,7 @@ TEST(Query, SaysWhatIsWrong)
   must(TSDestroy(&ts));
   SceneRun run(m.scene, 0.1, "");
   must(now.take(run.ts));
-  must(now.motion(m.tip, &x)); /* the start */
+  must(now.motion(m.tip, &x)); /* at the start */
   expectNear(x.position, {1.4, 0, 0}, 1e-12);
   must(run.solve());
   must(now.take(run.ts));
@@ -253,7 +255,7 @@ TEST(Query, SaysWhatIsWrong)
   refused(now.value(Measure::displacement(other.tip, 0), &y), "marker i is not one of this scene");
 }
 
-/* Forces at the start of a pendulum at its lowest point, described in any units of length and time */
+/* Forces at the start of a pendulum in its lowest position, in any units of length and time */
 TEST(Query, Units)
 {
   for (double length : {1., 1e3, 1e6})
@@ -281,7 +283,8 @@ TEST(Query, Units)
     }
 }
 
-/* A point that nobody thought of before the run: its motion can be asked for, and the run and others of the scene go on as without it */
+/* A marker created after the run was made: its motion can be asked for, and the run and other runs of the scene
+   continue unchanged */
 TEST(Query, MarkersMadeAfterwards)
 {
   const TemporaryFile file("afterwards.checkpoint");
@@ -317,7 +320,8 @@ TEST(Query, MarkersMadeAfterwards)
   EXPECT_EQ(state(resumed), state(run));
 }
 
-/* A body of 1 kg at the end of an arm of 1 m: a joint's multipliers are about the axes of marker j, wherever those of i point */
+/* A body of 1 kg at the end of an arm of 1 m: the multipliers of a joint are about the axes of marker j, also if those
+   of i point the opposite way */
 TEST(JointMultipliers, AxesThatPointAwayFromEachOther)
 {
   for (int flip : {-1, 0, 1, 2})
@@ -356,7 +360,7 @@ TEST(JointMultipliers, AxesThatPointAwayFromEachOther)
   }
 }
 
-/* A force in the axes of a marker does not act on that marker's body, which is an error to ask for */
+/* The marker whose axes a force uses is not loaded by the force; asking for the load on its body is an error */
 TEST(Query, TheFrameOfAForceTakesNoLoad)
 {
   Scene        s(PETSC_COMM_SELF);

@@ -1,4 +1,4 @@
-/* Local rotation vectors: their kinematics, and an application of its own that has them */
+/* Local rotation vectors: their kinematics, and an application without the scene library that uses them */
 #include "hhtdae/scene.h"
 #include "scene/rotation.h"
 #include "support.h"
@@ -17,7 +17,7 @@ Matrix3 exponential(const Vector3 &x)
   return a > 0 ? Eigen::AngleAxisd(a, x / a).toRotationMatrix() : Matrix3(Matrix3::Identity());
 }
 
-/* In all directions, up to where they are singular; both ways to Stumpff's functions meet at 1 */
+/* Rotation vectors in all directions, up to where they are singular; the two formulas for Stumpff's functions meet at 1 */
 std::vector<Vector3> vectors()
 {
   std::vector<Vector3>             all;
@@ -59,7 +59,7 @@ TEST(Rotation, GradientOfMoments)
     }
 }
 
-/* ---- with PETSc's interface alone ---- */
+/* ---- with PETSc's interface only ---- */
 
 namespace
 {
@@ -67,8 +67,8 @@ namespace
 /* A free body with two equal moments of inertia. With L its angular momentum, fixed in space, and s its spin about the third axis,
    w = L/J1 + (1 - J3/J1) s e3, so that A = exp([L] t/J1) A0 exp([e3] (1 - J3/J1) s t). */
 struct FreeBody {
-  Vector3       J{2, 2, 3}, spin{1, 0.5, 4}; /* body axes, at the start those of space */
-  double        stiffness = 0;               /* of what holds the third axis along that of space */
+  Vector3       J{2, 2, 3}, spin{1, 0.5, 4}; /* body axes, which coincide with the space axes at the start */
+  double        stiffness = 0;               /* of springs that hold the third axis parallel to that of space */
   Matrix3       C = Matrix3::Identity(), before;
 
   Matrix3 exact(double t) const
@@ -126,7 +126,7 @@ struct BodyRun {
   FreeBody body;
   TS       ts;
   Vec      U, V, F;
-  double   largest = 0; /* error at the ends of steps and between them */
+  double   largest = 0; /* largest error at the ends of steps and between them */
 
   explicit BodyRun(const std::string &options)
   {
@@ -197,14 +197,15 @@ TEST(Rotation, SecondOrderThroughPETSc)
     EXPECT_LT(b, 2e-3);
     const double c = errorOf(form + tolerance(1e-6)), d = errorOf(form + tolerance(1e-9));
     MEASURED("chosen steps: %.2e at 1e-6, %.2e at 1e-9", c, d);
-    EXPECT_LT(d, c / 50) << form; /* h goes with the cube root, the error with its square */
+    EXPECT_LT(d, c / 50) << form; /* h is proportional to the cube root of the tolerance, the error to its square */
   }
   const double a = errorOf(" -ts_hhtdae_form paper " + constant(2e-3)), b = errorOf(" -ts_hhtdae_form paper " + constant(1e-3));
   EXPECT_NEAR(std::log2(a / b), 1, 0.15);
 }
 
-/* A rotor whose axis is held by springs far stiffer than a step resolves: its tilt dies out, at little damping too. With the accelerations
-   of the beginning in place of the change of the angular velocity over the step it grows (rotations.cpp). */
+/* A rotor whose axis is held by springs that are far stiffer than a step resolves: its tilt decays, also with little
+   damping. It would grow if the second term of Magnus' series used the accelerations at the beginning instead of the
+   change of the angular velocity over the step (rotations.cpp) */
 TEST(Rotation, StiffAcrossTheAxisOfSpin)
 {
   for (double k : {1e2, 1e5, 1e8})
@@ -224,7 +225,8 @@ TEST(Rotation, StiffAcrossTheAxisOfSpin)
     }
 }
 
-/* The same above order two, where the rotation follows from backward differentiation. Stiffnesses are those for which this is stable without a spin. */
+/* The same above order two, where the rotation follows from backward differentiation, for stiffnesses at which
+   backward differentiation is stable without a spin */
 TEST(Rotation, StiffAcrossTheAxisOfSpinAboveOrderTwo)
 {
   for (double spin : {0., 10., 30.})
@@ -335,7 +337,8 @@ TEST(Rotation, OptionsOfScenes)
   EXPECT_NE(x[0], x[1]);
 }
 
-/* With a tolerance of their own rotations take longer or shorter steps, and places those that their own asks for; planar bodies, too */
+/* With an angle tolerance of their own, rotations determine shorter steps, or positions determine longer ones; the
+   same for planar bodies */
 TEST(Rotation, ToleranceOfTheirOwn)
 {
   for (bool planar : {false, true}) {
@@ -363,7 +366,7 @@ TEST(Rotation, ToleranceOfTheirOwn)
   }
 }
 
-/* Who does not count rotations anew in every step takes Euler angles */
+/* TS types that do not renew the reference attitudes in every step require Euler angles */
 TEST(Rotation, OtherTypesNeedEulerAngles)
 {
   for (bool euler : {false, true}) {
@@ -372,7 +375,7 @@ TEST(Rotation, OtherTypesNeedEulerAngles)
       EXPECT_EQ(TSSolve(t.ts, nullptr), 0);
       continue;
     }
-    ErrorTrap trap; /* where the type asks for the residual: inside of its own step PETSc's would lose its vectors */
+    ErrorTrap trap; /* called directly: inside of a step PETSc's type would leak its vectors */
     Vec       U, V, F;
     must(TS2GetSolution(t.ts, &U, &V));
     must(VecDuplicate(U, &F));
@@ -382,8 +385,8 @@ TEST(Rotation, OtherTypesNeedEulerAngles)
   }
 }
 
-/* The matrix of a step in which the spin changes by more than it was, against differences of what SNES solves: rotations depend on the angular
-   velocities at both ends */
+/* The matrix of a step in which the spin changes by more than its initial value, against differences of the residual
+   of the SNES: rotations depend on the angular velocities at both ends of the step */
 TEST(Rotation, MatrixOfAStepThatChangesTheSpin)
 {
   const double d = 1e-4;
@@ -411,7 +414,7 @@ TEST(Rotation, MatrixOfAStepThatChangesTheSpin)
   must(SNESGetJacobian(snes, nullptr, &P, nullptr, nullptr));
   must(VecDuplicate(X, &up));
   must(VecDuplicate(X, &down));
-  for (PetscInt i = 3; i < 6; i++) must(VecSetValue(X, i, 200. * (double)(i - 2), ADD_VALUES)); /* an iterate */
+  for (PetscInt i = 3; i < 6; i++) must(VecSetValue(X, i, 200. * (double)(i - 2), ADD_VALUES)); /* another iterate */
   must(VecAssemblyBegin(X));
   must(VecAssemblyEnd(X));
   must(SNESSetLagJacobian(snes, 1));
@@ -442,7 +445,7 @@ TEST(Rotation, MatrixOfAStepThatChangesTheSpin)
   must(TSDestroy(&ts));
 }
 
-/* A rotor that makes a full turn in a step, where rotation vectors are singular: the step is cut */
+/* A rotor that would make a full turn in a step, where rotation vectors are singular: the step is shortened */
 TEST(Rotation, FullTurnInAStep)
 {
   const double spin = 200 * PETSC_PI;
@@ -470,7 +473,7 @@ TEST(Rotation, FullTurnInAStep)
   }
 }
 
-/* As of a ball that rolls along a parabola: w = w0 + a t, so that the axis turns and accelerations do not change */
+/* w = w0 + a t, as of a ball that rolls along a parabola: the axis of rotation turns while the accelerations are constant */
 TEST(Rotation, AxisThatTurnsEvenly)
 {
   Scene          scene(PETSC_COMM_SELF);
@@ -505,7 +508,8 @@ TEST(Rotation, AxisThatTurnsEvenly)
   must(TSDestroy(&ts));
 }
 
-/* Between the ends of a step constraints are differentiated about the attitude there: the point that a joint holds has no acceleration */
+/* Between the ends of a step constraints are differentiated about the attitude at that time: the acceleration of the
+   point that a joint holds is zero */
 TEST(Rotation, SamplesWithinAStep)
 {
   Scene     scene(PETSC_COMM_SELF);

@@ -1,4 +1,4 @@
-/* What is wrong with the description of a scene is said by name, all of it at once. */
+/* Errors in the description of a scene are all reported at once, with the names of parts */
 #include "hhtdae/query.h"
 #include "hhtdae/scene.h"
 #include "scene/model.h"
@@ -110,7 +110,8 @@ TEST(SceneCheck, ThePlaneOfAPlanarScene)
   SAYS(text, "marker tip: its z axis is 1, 0, 0");
 }
 
-/* A planar scene has forces in its plane and moments about z: others are errors, and gravity along z, which every spatial model has, is told */
+/* A planar scene has forces in its plane and moments about z. Other loads are errors, except that gravity along z,
+   which planar models copied from spatial ones have, is only reported */
 TEST(SceneCheck, LoadsOutOfThePlane)
 {
   using hhtdae::Expression;
@@ -214,7 +215,8 @@ TEST(SceneCheck, OptionsOfTheStart)
   SAYS(complaint(other), "-scene_angle_tol is -1");
 }
 
-/* Each run begins as start() and the options say when it is made, whatever they were before; the set-up is repeated for no other reason */
+/* Each run begins according to start() and the options at the time when it is made; the set-up is repeated only if
+   these have changed */
 TEST(SceneCheck, AStartThatChangesLater)
 {
   Scene      s(PETSC_COMM_SELF);
@@ -242,11 +244,12 @@ TEST(SceneCheck, AStartThatChangesLater)
     Options in("-scene_equilibrium_pc_type lu -ts_dt -1 -scene_dt 1");
     start();
     start();
-    EXPECT_EQ(described, 5); /* options of the solvers of the set-up count, those of a run do not; what is refused has left the model alone */
+    EXPECT_EQ(described, 5); /* options of the set-up's solvers count, those of a run do not; refused options have left the model unchanged */
   }
 }
 
-/* which then is no inertia that assembly takes for real */
+/* Moments of inertia that do not exist, those of a planar body about x and y and those of a point mass, do not set the
+   scale by which assembly judges the inertia of a body as too light */
 TEST(SceneCheck, InertiaThatIsNotThere)
 {
   for (const bool planar : {true, false}) {
@@ -274,7 +277,8 @@ TEST(SceneCheck, ShearOfAPlanarBeam)
   SAYS(complaint(s), "beam beam: G is 0");
 }
 
-/* Points that were put at one place of two bodies, one of them turned, are not apart, as far as they can be told */
+/* Points placed at the same position on two bodies, one of them rotated, coincide except for rounding, which must be
+   recognized */
 TEST(SceneCheck, PointsAtOnePlaceButForRounding)
 {
   const Vector3 p(.1, .2, .3);
@@ -291,7 +295,8 @@ TEST(SceneCheck, PointsAtOnePlaceButForRounding)
   }
 }
 
-/* Products vanish after a third of a turn, too, where the axes have changed places */
+/* Axes rotated by a third of a turn about (1, 1, 1) are a permutation of the original ones, so that the scalar
+   products of a fixed joint vanish although the axes are not parallel */
 TEST(SceneCheck, MarkersWithOtherAxes)
 {
   for (double angle : {2 * M_PI / 3, -2 * M_PI / 3}) {
@@ -304,7 +309,8 @@ TEST(SceneCheck, MarkersWithOtherAxes)
   }
 }
 
-/* A planar body without a moment about z has that of others to be assembled by, whatever the rest of its inertia says */
+/* For assembly, a planar body without a moment of inertia about z takes one like those of other bodies, whatever its
+   other moments of inertia */
 TEST(SceneCheck, LightInertiaInThePlane)
 {
   Scene     s(PETSC_COMM_SELF, hhtdae::Space::Planar);

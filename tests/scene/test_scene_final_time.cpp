@@ -1,4 +1,4 @@
-/* The state of a scene at a final time that no step meets */
+/* The state of a scene at a final time at which no step ends */
 #include "support.h"
 
 #include <hhtdae/scene.h>
@@ -46,5 +46,5 @@ TEST(SceneFinalTime, ByInterpolation)
   EXPECT_GT(over.t(), .5);
   MEASURED("positions %.1e, velocities %.1e of a step that ends there", relativeDifference(whole(between.U), whole(exact.U)), relativeDifference(whole(between.V), whole(exact.V)));
   EXPECT_LT(relativeDifference(whole(between.V), whole(exact.V)), 1e-4);
-  EXPECT_GT(relativeDifference(whole(over.V), whole(exact.V)), 1e-3); /* or the test shows nothing */
+  EXPECT_GT(relativeDifference(whole(over.V), whole(exact.V)), 1e-3); /* otherwise the test would show nothing */
 }

@@ -1,4 +1,4 @@
-/* Channels, their files, the animation: what is written is what the run had. */
+/* Channels and their files, animation: the files contain what the run had */
 #include "hhtdae/linearize.h"
 #include "scene/kernels/spring.h"
 #include "scene/kernels/spring_torsion.h"
@@ -19,7 +19,7 @@ struct Interpolated {
   Array  t, x, v;
 };
 
-/* The first rod's centre straight from the integrator, at multiples of dt */
+/* The first rod's centre directly from the integrator, at multiples of dt */
 PetscErrorCode Interpolate(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)
 {
   Interpolated      &s = *static_cast<Interpolated *>(ctx);
@@ -68,7 +68,8 @@ TEST(SceneOutput, SamplesAreTheDenseOutput)
   EXPECT_LT(table.row[10][1], -0.1);
 }
 
-/* A rod let go from the horizontal: at once alpha = 3g/(2L), the pin carries m g/4; then m (a - g) at any time */
+/* A rod released from the horizontal: initially alpha = 3g/(2L), and the pin carries m g/4; at any time the reaction
+   is m (a - g) */
 TEST(SceneOutput, ReactionOfARevoluteJoint)
 {
   TemporaryFile file("reaction.csv");
@@ -91,7 +92,7 @@ TEST(SceneOutput, ReactionOfARevoluteJoint)
   EXPECT_NEAR(fy[0], 9.81 / 4, 1e-9);
   EXPECT_NEAR(table.column("alpha")[0], -1.5 * 9.81, 1e-8);
   for (std::size_t k = 0; k < table.row.size(); k++) {
-    EXPECT_NEAR(fx[k], table.column("ax")[k], 1e-4) << k; /* between steps both are interpolated linearly, the angle is not */
+    EXPECT_NEAR(fx[k], table.column("ax")[k], 1e-4) << k; /* between steps both are interpolated linearly, but not the angle */
     EXPECT_NEAR(fy[k], table.column("ay")[k] + 9.81, 1e-4) << k;
     for (const char *zero : {"fz", "mx", "my", "mz"}) EXPECT_NEAR(table.column(zero)[k], 0, 1e-3) << zero << k;
     EXPECT_NEAR(std::hypot(lx[k], ly[k]), std::hypot(fx[k], fy[k]), 1e-9);
@@ -118,7 +119,7 @@ Array Dataset(PetscViewer viewer, const char *name, PetscInt n)
 
 } // namespace
 
-/* More samples than a block, so that datasets grow; a dataset in a group */
+/* More samples than a block, so that datasets are extended; datasets in a group */
 TEST(SceneOutput, HDF5HasWhatTheTableHas)
 {
   TemporaryFile file("run.h5"), csv("run.csv");
@@ -145,7 +146,7 @@ TEST(SceneOutput, HDF5HasWhatTheTableHas)
 }
 #endif
 
-/* A further solve goes on in the same files, without a sample twice */
+/* A further solve continues the same files without repeating a sample */
 TEST(SceneOutput, GoesOnAfterAPause)
 {
   TemporaryFile file("pause.csv");
@@ -213,10 +214,10 @@ TEST(SceneOutput, FilesWithoutChannelsAndLateChannels)
   rods.scene.channel("t", Measure::time());
   ErrorTrap trap;
   EXPECT_NE(run.solve(), 0);
-  EXPECT_TRUE(trap.says("channel t came too late")) << trap.message; /* where files are asked for that would not have it */
+  EXPECT_TRUE(trap.says("channel t came too late")) << trap.message; /* when files are requested that would lack this channel */
 }
 
-/* Runs outlive changes of their scene: what comes too late is an error of the next one alone */
+/* A run continues unchanged after its scene has been changed; only the next run reports additions that came too late */
 TEST(SceneOutput, ARunOutlivesALateChannel)
 {
   Rods rods(1);
@@ -235,7 +236,7 @@ TEST(SceneOutput, ARunOutlivesALateChannel)
   EXPECT_TRUE(trap.says("channel late came too late")) << trap.message;
 }
 
-/* Scene::solve() writes results, TSSolve() says that it does not */
+/* Scene::solve() writes results; TSSolve() reports that it does not */
 TEST(SceneOutput, TSSolveInPlaceOfSolve)
 {
   TemporaryFile file("tssolve.csv");
@@ -261,7 +262,7 @@ TEST(SceneOutput, TSSolveInPlaceOfSolve)
 namespace
 {
 
-/* Names of the elements of an XML file, every one closed in its order */
+/* Number of elements of this name in an XML file; all elements must be closed in the right order */
 int Elements(const std::string &text, const std::string &name)
 {
   std::vector<std::string> open;
@@ -329,7 +330,7 @@ TEST(SceneOutput, FramesOfTheAnimation)
     EXPECT_EQ(*std::min_element(body.begin(), body.end()), -1);
     EXPECT_EQ(*std::max_element(body.begin(), body.end()), 1);
   }
-  /* the box comes first: at the start its corner is at (0, -0.1, -0.2); it moves, and edges stay as long */
+  /* the box comes first: initially its corner is at (0, -0.1, -0.2); it moves, and its edges keep their lengths */
   const auto p0 = Data<float>(frame[0].text(), "points"), p2 = Data<float>(frame[2].text(), "points");
   EXPECT_NEAR(p0[0], 0, 1e-6);
   EXPECT_NEAR(p0[1], -0.1, 1e-6);
@@ -338,7 +339,7 @@ TEST(SceneOutput, FramesOfTheAnimation)
   EXPECT_NEAR(std::hypot(p2[3] - p2[0], p2[4] - p2[1]), 1, 1e-5);
 }
 
-/* Opposite phases of a mode are on opposite sides of the state */
+/* Frames at opposite phases of a mode are on opposite sides of the state */
 TEST(SceneOutput, FramesOfAMode)
 {
   Rods              rods(4);

@@ -1,4 +1,4 @@
-/* Scenes that go on from a checkpoint: the same bits, and what is recorded goes on in the same files; what users' functions do wrong */
+/* Scenes resumed from a checkpoint give the same bits and continue the same files; errors in users' functions */
 #include "hhtdae/analyses.h"
 #include "hhtdae/query.h"
 #include "scene/model.h"
@@ -11,7 +11,7 @@ namespace
 
 const std::string accurate = " -ts_rtol 1e-7 -ts_atol 1e-7 ";
 
-/* The names of one run's files */
+/* Names of the files of one run */
 struct Files {
   TemporaryFile csv, balance, index, checkpoint;
   std::string   prefix;
@@ -131,7 +131,7 @@ TEST(SceneResume, FilesGoOn)
   breakAndResume("0");
 }
 
-/* Queries between TSHHT3CheckpointLoad() and the first step */
+/* Snapshots between TSHHT3CheckpointLoad() and the first step show the state of the file */
 TEST(SceneResume, QueriesSeeTheFile)
 {
   TemporaryFile file("queried.checkpoint");
@@ -187,7 +187,8 @@ TEST(SceneResume, WritingChangesNothing)
   EXPECT_EQ(a.balance.text(), b.balance.text());
 }
 
-/* A file that is not there begins where the run goes on, in the grid of before; one that is too short cannot go on */
+/* If the CSV file does not exist it begins where the run resumes, at times of the same grid; if it is too short the
+   run is refused */
 TEST(SceneResume, OtherFiles)
 {
   const Files       a("first"), b("second");

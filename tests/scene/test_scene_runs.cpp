@@ -1,4 +1,5 @@
-/* One scene, several runs; calls in the wrong order; handles of another scene: each a clear error, or right */
+/* One scene and several runs; calls in the wrong order; handles of another scene: each gives the right result or a
+   clear error */
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -6,7 +7,7 @@ using namespace hhtest;
 namespace
 {
 
-/* A wheel that turns many times against a torsional spring, whose angle is counted */
+/* A wheel that makes many turns against a torsional spring, whose angle is counted */
 struct Winder {
   Scene   scene{PETSC_COMM_SELF};
   Body    wheel;
@@ -40,7 +41,7 @@ void expectError(PetscErrorCode code, const ErrorTrap &trap, const std::string &
 
 } // namespace
 
-/* Each TS starts from the description, angles and axes too */
+/* Each TS starts from the description, including counted angles and reference axes */
 TEST(SceneRuns, ASecondTSIsASecondRun)
 {
   Winder w;
@@ -53,7 +54,7 @@ TEST(SceneRuns, ASecondTSIsASecondRun)
   EXPECT_EQ(end[0], end[1]);
 }
 
-/* Step by step in turns, the same digits as one after the other */
+/* Two runs that make steps alternately give the same digits as one after the other */
 TEST(SceneRuns, SideBySide)
 {
   Winder   w;
@@ -72,7 +73,7 @@ TEST(SceneRuns, SideBySide)
   EXPECT_EQ(solution(second.ts), solution(alone.ts));
 }
 
-/* A run owns what it needs of the scene */
+/* A run owns what it needs of the scene, which may be destroyed */
 TEST(SceneRuns, OutlivesItsScene)
 {
   TS    ts;
@@ -97,7 +98,7 @@ TEST(SceneRuns, TheSameTSDoesNotStartAgain)
   Winder   w;
   SceneRun run(w.scene, 1, tolerance(1e-6));
   must(run.solve());
-  must(TSSetMaxTime(run.ts, 2)); /* going on is all right */
+  must(TSSetMaxTime(run.ts, 2)); /* continuing the run is allowed */
   must(run.solve());
   must(TSSetTime(run.ts, 0));
   must(TSSetStepNumber(run.ts, 0));
@@ -140,7 +141,7 @@ TEST(SceneRuns, CallsAfterTheSetUp)
     Winder   w;
     SceneRun run(w.scene, 0.1, "");
     call(w);
-    must(run.solve()); /* runs outlive changes of their scene */
+    must(run.solve()); /* a run continues after its scene has been changed */
     ErrorTrap trap;
     TS        ts;
     expectError(w.scene.createTS(&ts), trap, name);
@@ -148,7 +149,7 @@ TEST(SceneRuns, CallsAfterTheSetUp)
   }
 }
 
-/* Bodies are where they were for a run that goes on with coordinates of another kind */
+/* A run may continue with coordinates of another kind (rotation vectors or Euler angles); bodies keep their positions */
 TEST(SceneRuns, GoesOnWithAnotherStart)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -198,6 +199,6 @@ TEST(SceneRuns, HandlesOfAnotherScene)
     expectError(w.scene.setUp(), trap, message);
   }
   Winder w, other;
-  w.scene.marker(other.scene.ground()); /* the ground is one */
+  w.scene.marker(other.scene.ground()); /* the ground is the same in all scenes */
   must(w.scene.setUp());
 }

@@ -1,4 +1,4 @@
-/* Channels between the ends of steps: reactions, accelerations and force states as accurate as the positions they belong to. */
+/* Channels between the ends of steps: reactions, accelerations and force states are as accurate as positions */
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -13,7 +13,7 @@ struct Table {
   TSHHT3Statistics         statistics;
 };
 
-/* A run with all channels of the scene recorded at times dt apart; dt = 0: at the ends of steps; negative: not at all */
+/* A run with all channels of the scene recorded at intervals dt; dt = 0: at the ends of steps; dt < 0: not recorded */
 Table record(Scene &scene, double end, double dt, const std::string &options)
 {
   TemporaryFile file("samples.csv");
@@ -31,7 +31,7 @@ Table record(Scene &scene, double end, double dt, const std::string &options)
   return t;
 }
 
-/* Largest difference of column c from a reference, whose samples are taken at the same times */
+/* Largest difference of column c from a reference sampled at the same times */
 double difference(const Table &a, const Table &b, std::size_t c)
 {
   double d = 0;
@@ -41,7 +41,8 @@ double difference(const Table &a, const Table &b, std::size_t c)
 
 } // namespace
 
-/* Driven by gravity alone, its q''' vanishes: one step may be as long as the run. The weight's lever grows like t^2. */
+/* A slider driven by gravity alone has q''' = 0, so that a step may be as long as the run; the lever arm of its weight
+   grows like t^2 */
 TEST(SceneSamples, SliderInOneStep)
 {
   for (const char *form : {"", " -ts_hhtdae_form paper"}) {
@@ -68,7 +69,7 @@ TEST(SceneSamples, SliderInOneStep)
   }
 }
 
-/* Second order, as at the steps themselves: reactions, accelerations, force states, a variable */
+/* Samples are of second order, like the values at the ends of steps: reactions, accelerations, force states, a variable */
 TEST(SceneSamples, OrderBetweenSteps)
 {
   std::vector<Table> t;
@@ -95,14 +96,15 @@ TEST(SceneSamples, OrderBetweenSteps)
     MEASURED("%-12s errors of samples at h = 4, 2, 1 ms: %.2e %.2e %.2e, order %.2f %.2f", t[0].name[c].c_str(), e[0],
              e[1], e[2], order(e[0], e[1]), order(e[1], e[2]));
     EXPECT_GT(order(e[0], e[1]), 1.85) << t[0].name[c];
-    EXPECT_GT(order(e[1], e[2]), 1.85) << t[0].name[c]; /* the reference is of h = 0.25 ms: 2.1 at best */
+    EXPECT_GT(order(e[1], e[2]), 1.85) << t[0].name[c]; /* the reference has h = 0.25 ms, so that 2.1 is the best observable order */
   }
 }
 
 namespace
 {
 
-/* A rod on a motor that falls on a ball, with friction in the contact, a stop that reads a reaction, a nonlinear spring */
+/* A rod on a motor that falls on a ball, with friction in the contact, a stop that depends on a reaction, and a
+   nonlinear spring */
 struct Clatter {
   Rods    rods{3};
   Element stop;
@@ -134,7 +136,7 @@ struct Clatter {
 
 } // namespace
 
-/* The run is the same to the last bit whether it is sampled or not */
+/* The run is the same to the last bit with and without samples */
 TEST(SceneSamples, LeaveTheRunAlone)
 {
   for (const char *options : {"", "-ts_hhtdae_form paper", "-scene_redundant keep -ts_adapt_type none -ts_dt 2e-3"}) {
@@ -148,8 +150,8 @@ TEST(SceneSamples, LeaveTheRunAlone)
   }
 }
 
-/* Newton's law for the middle rod, from outputs alone, at every sample of a run through contacts; and no sample beyond what
-   the steps have */
+/* Newton's law for the middle rod at every sample of a run with contacts, from outputs alone; no sample exceeds the
+   values at the ends of steps */
 TEST(SceneSamples, ForcesBalanceThroughContacts)
 {
   for (const char *options : {"", "-ts_hhtdae_form paper"}) {
@@ -162,11 +164,11 @@ TEST(SceneSamples, ForcesBalanceThroughContacts)
       throw std::runtime_error(what);
     };
     double imbalance = 0, largest = 0, own = 0;
-    for (std::size_t k = 1; k + 1 < t.row.size(); k++) /* the ends of the run are ends of steps */
+    for (std::size_t k = 1; k + 1 < t.row.size(); k++) /* the first and the last sample are ends of steps */
       for (int c = 0; c < 2; c++) {
         const std::string axis = std::to_string(c);
         const Array      &r    = t.row[k];
-        /* on rod 1: the pin to rod 0 acts on it, that to rod 2 acts on rod 2 */
+        /* loads on rod 1: the pin to rod 0 acts on rod 1, the pin to rod 2 acts on rod 2 */
         const double force = r[column("g" + axis)] - r[column("f2" + axis)] - (c == 1 ? 9.81 : 0);
         widen(imbalance, std::abs(force - r[column("a" + axis)]));
         widen(largest, std::abs(r[column("g" + axis)]));
@@ -180,7 +182,7 @@ TEST(SceneSamples, ForcesBalanceThroughContacts)
   }
 }
 
-/* Positions alone cost no solve */
+/* Channels of positions alone need no linear solves */
 TEST(SceneSamples, OnlyWhereTheyAreNeeded)
 {
   Rods rods(2);
@@ -202,7 +204,7 @@ TEST(SceneSamples, OnlyWhereTheyAreNeeded)
   EXPECT_GT(after.count, before.count + 100);
 }
 
-/* Another TS type has the ends of its steps alone */
+/* With another TS type samples are possible only at the ends of steps */
 TEST(SceneSamples, OfOtherTypes)
 {
   Scene     s(PETSC_COMM_SELF);

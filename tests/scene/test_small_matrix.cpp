@@ -1,4 +1,5 @@
-/* Values in place of expressions: the numbers that Eigen gives, its parts and transposes included, and what is larger left to Eigen. */
+/* Matrix functions that return values instead of expressions: same numbers as Eigen, also for parts and transposes;
+   large matrices are left to Eigen */
 #include "scene/small_matrix.h"
 #include <gtest/gtest.h>
 
@@ -16,7 +17,7 @@ template <int R, int C> Eigen::Matrix<double, R, C> numbers(double from)
   return A;
 }
 
-/* As matrices whose size is not known when compiled, which are Eigen's */
+/* Copies to matrices of dynamic size, for which Eigen's own functions are used */
 template <class A> MatrixXd free(const A &a) { return a; }
 
 template <class A, class B> void same(const A &ours, const B &eigens)
@@ -53,7 +54,7 @@ TEST(SmallMatrix, NumbersOfEigen)
   same(six.head<3>() - six.tail<3>(), free(six).topRows(3) - free(six).bottomRows(3));
 }
 
-/* a = A a, where the product is known before a is written */
+/* a = A a: the product is computed before a is written */
 TEST(SmallMatrix, GoesIntoItsOperands)
 {
   const Matrix3d A = numbers<3, 3>(0.3);

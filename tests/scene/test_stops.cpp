@@ -1,4 +1,4 @@
-/* Stops, ropes and struts: derivatives, the law of their force, and runs against closed forms. */
+/* Stops, ropes and struts: derivatives, force law, and runs against closed forms */
 #include "force_checks.h"
 #include "hhtdae/query.h"
 #include "scene/kernels/stop.h"
@@ -11,7 +11,7 @@ using namespace hhtest;
 namespace
 {
 
-/* at a coordinate s below, within or beyond the travel */
+/* a state with the coordinate s below, within or beyond the travel */
 StopData stop(Random &random, double s)
 {
   StopData d{};
@@ -70,7 +70,8 @@ TEST(Stops, Derivatives)
   CheckForce<LengthStop>([](Random &random, Frame<double> *f) { return stop(random, (f[0].x - f[1].x).norm()); });
 }
 
-/* Thrown against a linear stop: half a period of the spring, and back at the same speed; energy is conserved on the way */
+/* A mass thrown against a linear stop is in contact for half a period of the spring and returns with the same speed;
+   energy is conserved */
 TEST(Stops, ASliderBouncesBetweenTheEnds)
 {
   ContactLaw law;
@@ -78,7 +79,7 @@ TEST(Stops, ASliderBouncesBetweenTheEnds)
   law.exponent  = 1;
   Slider s(3, law);
   const double omega = std::sqrt(law.stiffness / 2), depth = 3 / omega, contact = M_PI / omega, period = 4. / 3 + 2 * contact;
-  SceneRun run(s.scene, 1.25 * period, tolerance(1e-8)); /* a quarter beyond a cycle: at the upper end, in the middle of its contact */
+  SceneRun run(s.scene, 1.25 * period, tolerance(1e-8)); /* a quarter of a period after a cycle: at the upper end, in the middle of the contact */
   must(run.solve());
   Snapshot now;
   Motion   m;
@@ -92,7 +93,7 @@ TEST(Stops, ASliderBouncesBetweenTheEnds)
   EXPECT_NEAR(kinetic + potential, 9, 1e-2); /* numerical damping takes 1.2e-3 */
 }
 
-/* A pendulum of 1 m in a cage of 0.3 rad, after more than a turn of counting: it stays in */
+/* A pendulum of 1 m stays between stops at +-0.3 rad, also after its angle has been counted over more than a turn */
 TEST(Stops, AnArmStaysWithinItsAngles)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -106,7 +107,7 @@ TEST(Stops, AnArmStaysWithinItsAngles)
   stop.lower         = -0.5;
   stop.upper         = 2 * M_PI + 0.3;
   stop.law.stiffness = 1e5;
-  stop.law.damping   = 10; /* nothing comes back */
+  stop.law.damping   = 10; /* strong damping, so that it does not rebound */
   s.add("pin", Revolute{i, j});
   s.add("stop", stop);
   s.channel("angle", Measure::angle(i, j));
@@ -118,7 +119,8 @@ TEST(Stops, AnArmStaysWithinItsAngles)
   EXPECT_LT(now[0], 2 * M_PI + 0.31);
 }
 
-/* A mass falls 1 m in a rope of 0.5 m: the greatest tension by energy, and nothing while the rope is slack */
+/* A mass falls 1 m on a rope of 0.5 m: the largest tension follows from energy, and there is no force while the rope
+   is slack */
 TEST(Stops, ARopeHoldsAndIsSlack)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -150,7 +152,7 @@ TEST(Stops, ARopeHoldsAndIsSlack)
   EXPECT_NEAR(now[0], 4e3 * most, 1e-3 * 4e3 * most);
 }
 
-/* The same weight on the same stop, wherever the marker is that the travel counts from */
+/* The same load on the same stop, for any position of the marker from which the travel is measured */
 TEST(Stops, ALoadOnAStopAnywhere)
 {
   const double g = 9.81, k = 1e5;
@@ -171,7 +173,8 @@ TEST(Stops, ALoadOnAStopAnywhere)
   }
 }
 
-/* In the plane a stop without an axis ends the travel along x_j, that of Translational; x_j is up here, and the block rests on the stop */
+/* In a planar scene a stop without an axis acts along x_j, like Translational; here x_j points up, and the block rests
+   on the stop */
 TEST(Stops, WithoutAnAxisItIsAlongTheGuideInThePlane)
 {
   const double g = 9.81, k = 1e5, height = 0.4;
@@ -189,7 +192,7 @@ TEST(Stops, WithoutAnAxisItIsAlongTheGuideInThePlane)
     TranslationalStop s{i, j};
     s.lower = height;
     s.law   = {k, 1};
-    if (axis == 0) s.axis = 0; /* else the default */
+    if (axis == 0) s.axis = 0; /* otherwise the default axis */
     const Element stop = scene.add("stop", s);
     scene.start().equilibrium = true;
     TS       ts;
@@ -206,7 +209,8 @@ TEST(Stops, WithoutAnAxisItIsAlongTheGuideInThePlane)
   EXPECT_EQ(rests[0], rests[2]);
 }
 
-/* Past the middle of a stop of 0.5 at a distance of 0.3, from far away: without other forces steps would grow over the whole passage */
+/* A mass flies towards a stop at a least distance of 0.5, past its centre at 0.3. Without other forces the steps would
+   grow until one passes over the whole contact */
 TEST(Stops, NothingFliesThroughALeastDistance)
 {
   Vector3 gone[2];

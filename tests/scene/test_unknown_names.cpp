@@ -1,4 +1,4 @@
-/* What the integrator's messages call the unknowns of a scene */
+/* The names of a scene's unknowns in messages of the integrator */
 #include "scene/model.h"
 #include "scene_start.h"
 #include <set>
@@ -9,7 +9,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Two rods on pins, with a variable, a state and a force carried as one: redundant rows of the second pin are dropped */
+/* Two rods on pins, with a variable, a state and a force state; redundant rows of the second pin are dropped */
 struct NamedRods {
   Scene scene;
   Body  first, second;
@@ -74,7 +74,7 @@ TEST(UnknownNames, InThePlane)
   EXPECT_EQ(n[9].rfind("revolute knee: row 2 of 2 (", 0), 0u) << n[9];
 }
 
-/* Of rows that are dropped there are no unknowns: those behind keep their own names */
+/* Dropped rows have no unknowns; the rows after them keep their own names */
 TEST(UnknownNames, BesideDroppedRows)
 {
   NamedRods r;

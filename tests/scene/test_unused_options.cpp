@@ -1,4 +1,4 @@
-/* Options of ours that nobody reads are reported, with the name that was meant */
+/* Options of this library that nothing reads are reported, together with the name that was probably meant */
 #include "integrator/type/unused.h"
 #include "support.h"
 
@@ -9,7 +9,7 @@ using namespace hhtest;
 namespace
 {
 
-/* What is said at the end of a program with these options, in which `use` has been done */
+/* The message at the end of a program with these options, in which `use` has been called */
 std::string reportOf(const std::string &options, const std::function<void()> &use = [] {})
 {
   Options in(options);
@@ -49,7 +49,7 @@ TEST(UnusedOptions, PrefixOfAnObject)
   EXPECT_TRUE(says(r, "-right_ts_hhtdae_alpha was not used: nobody has read it")) << r;
 }
 
-/* One of several TS has used it: no false alarm. And what is not ours is PETSc's to report. */
+/* No report if one of several TS has used the option; PETSc's own options are left to PETSc */
 TEST(UnusedOptions, NoFalseAlarms)
 {
   const std::string own = "-ts_hhtdae_alpha -0.1 -ts_hhtdae_reuse 1.4,0.25,1.2 ";

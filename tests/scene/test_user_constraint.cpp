@@ -1,4 +1,5 @@
-/* Constraints that a user gives as expressions: derivatives, and runs against the library's own joints and closed equations of motion. */
+/* User constraints given by expressions: derivatives, and runs compared with the library's joints and with closed
+   equations of motion */
 #include "hhtdae/query.h"
 #include "kernel_checks.h"
 #include "scene/kernels/user_constraint.h"
@@ -39,7 +40,7 @@ UserRowData row(std::vector<Argument> arguments, RealFunction<const Real *> f)
   return d;
 }
 
-/* the angle of 0 about z of 1 is defined, and remembered some turns away */
+/* keeps the angle of marker 0 about z of marker 1 well defined, with a count of some turns */
 void angle(Random &random, Frame<double> *f, UserRowData &d)
 {
   while (std::abs(f[0].R.col(0).dot(f[1].R.col(2))) > .9) f[0].R = random.rotation();
@@ -69,7 +70,7 @@ UserRowData ofVelocities(Random &random, Frame<double> *f)
   return d;
 }
 
-/* a point that slides on the parabola y = x^2/2 under gravity */
+/* A bead that slides on the parabola y = x^2/2 under gravity */
 struct Bead {
   Scene   scene;
   Body    bead;
@@ -91,7 +92,7 @@ struct Bead {
   }
 };
 
-/* (1 + x^2) x'' + x x'^2 + g x = 0 by classical Runge-Kutta steps; x, x' at t from x = 1 at rest */
+/* Integrates (1 + x^2) x'' + x x'^2 + g x = 0 by classical Runge-Kutta steps; x, x' at t, from x = 1 at rest */
 void parabola(double t, double *x)
 {
   const auto f = [](const double *y, double *d) {
@@ -144,7 +145,7 @@ TEST(UserConstraint, BeadOnAParabola)
   EXPECT_NEAR(channel[0], l.force(1), 1e-9 * l.force.norm());
 }
 
-/* In millimetres the row is a million times as large: what is met is told all the same */
+/* A row in mm^2 has numbers a million times as large; a satisfied constraint must be recognized nevertheless */
 TEST(UserConstraint, ItsUnitIsNoMisfit)
 {
   for (double unit : {1., 1e3, 1e-3}) {
@@ -166,7 +167,7 @@ TEST(UserConstraint, ItsUnitIsNoMisfit)
   }
 }
 
-/* The same cam as a motion of its own, over three turns: the angle is counted */
+/* The same cam as a motion, over three turns: the angle is counted */
 TEST(UserConstraint, CamOverManyTurns)
 {
   Scene     s(PETSC_COMM_SELF, Space::Planar);
@@ -187,7 +188,7 @@ TEST(UserConstraint, CamOverManyTurns)
   EXPECT_NEAR(m.position(0), 0.01 * 21 * 21, 1e-9);
 }
 
-/* A skate, by a row of velocities and by the library's knife edge */
+/* A skate by a velocity-level row, compared with the library's knife edge */
 TEST(UserConstraint, SkateAsKnifeEdge)
 {
   Motion m[2];
@@ -199,11 +200,11 @@ TEST(UserConstraint, SkateAsKnifeEdge)
     b.angular_velocity = {0, 0, 0.7};
     const Body   skate = s.add("skate", b);
     const Marker i = s.marker(skate, {0.2, 0, 0}), j = s.marker(s.ground());
-    DataOf(s).bodies[0].v(1) = -0.7 * 0.2; /* none along y of the marker */
+    DataOf(s).bodies[0].v(1) = -0.7 * 0.2; /* no velocity along y of the marker */
     s.add("floor", Planar{i, j});
     const Element edge = own ? s.add("edge", UserConstraint{{Expression{{Measure::velocity(i, 1, j, i)}, [](const Real *v) { return v[0]; }}}})
                              : s.add("edge", KnifeEdge{i, j});
-    if (!own) s.start().redundant = Redundant::Drop; /* the floor, once more */
+    if (!own) s.start().redundant = Redundant::Drop; /* the plane of the floor is constrained twice */
     s.gravity({1, 0.5, 0});
     SceneRun run(s, 3, tolerance(1e-9));
     must(run.solve());
@@ -220,7 +221,7 @@ TEST(UserConstraint, SkateAsKnifeEdge)
   EXPECT_NEAR(side[0], side[1], 1e-5 * std::abs(side[0]));
 }
 
-/* A velocity that follows a state, a first-order lag of a demand */
+/* A velocity that follows a state, which is a first-order lag of the demanded velocity */
 TEST(UserConstraint, SpeedFollowsAState)
 {
   Scene     s(PETSC_COMM_SELF);
@@ -239,7 +240,7 @@ TEST(UserConstraint, SpeedFollowsAState)
   EXPECT_NEAR(m.position(0), 2, 1e-5);
 }
 
-/* Twice the same row: one is redundant, however it is scaled */
+/* Two rows with the same meaning: one is redundant, however it is scaled */
 TEST(UserConstraint, RowsThatSayTheSame)
 {
   Bead b;
@@ -270,7 +271,8 @@ TEST(UserConstraint, JacobianOfAScene)
   EXPECT_LT(any.jacobianError(20, 400, .02), 1e-5);
 }
 
-/* What throws after the first look, in assembly or in a step, is an error with the name of the row */
+/* An exception that is thrown after the first evaluation, during assembly or in a step, becomes an error with the name
+   of the row */
 TEST(UserConstraint, WhatThrowsLater)
 {
   for (int good : {3, 40}) {
@@ -327,7 +329,8 @@ TEST(UserConstraint, Refuses)
   says(one(many, same), "names 8 markers, at most 6");
 }
 
-/* z' = V, V = -2 z, from 0.1: the velocity that the definition of V asks for is consistent, whatever the variable's own value at first */
+/* z' = V, V = -2 z, from 0.1: consistent initial velocities follow from the definition of V, whatever its given
+   initial value */
 TEST(UserConstraint, StartVelocitiesByAVariable)
 {
   for (Assembly how : {Assembly::Report, Assembly::Project})
@@ -353,7 +356,7 @@ TEST(UserConstraint, StartVelocitiesByAVariable)
     }
 }
 
-/* Derivatives that are none where the row is tried do not make it a linear one */
+/* Derivatives that are NaN at the trial state do not let a row be taken for a linear one */
 TEST(UserConstraint, NoNumberIsNotLinear)
 {
   const UserRowData d = row({reads(Measure::Velocity, 0, 1)}, [](const Real *m) { return pow(m[0], 1.5); });

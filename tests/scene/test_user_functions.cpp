@@ -1,4 +1,4 @@
-/* What may stand where a user's function of Reals is asked for, and steps of the state */
+/* Which C++ functions of Reals are accepted as user's functions, and smooth steps of the state */
 #include "hhtdae/scene.h"
 #include "support.h"
 
@@ -8,7 +8,7 @@ using namespace hhtdae;
 namespace
 {
 
-/* With and without "-> Real": what is computed with Reals is a Real, and nothing that refers to others */
+/* with and without "-> Real" the result is a Real, not an expression that refers to its operands */
 const auto bare     = [](const Real &l, const Real &v) { return 100. * l * l + 2. * v; };
 const auto typed    = [](const Real &l, const Real &v) -> Real { return 100. * l * l + 2. * v; };
 const auto plain    = [](const Real &l, const Real &) { return l; };
@@ -32,7 +32,7 @@ TEST(UserFunctions, ALambdaHasToReturnANumber)
   EXPECT_TRUE(law<decltype(typed)>);
   EXPECT_TRUE(law<decltype(plain)>);
   EXPECT_TRUE(law<decltype(constant)>);
-  EXPECT_FALSE(law<decltype(several)>); /* other arguments */
+  EXPECT_FALSE(law<decltype(several)>); /* functions with other arguments are rejected */
   EXPECT_FALSE(law<decltype(words)>);
   EXPECT_TRUE((law<std::function<Real(const Real &, const Real &)>>));
 }
@@ -52,7 +52,7 @@ TEST(UserFunctions, TheyAreCopiedAndAsked)
   EXPECT_EQ(ForceLaw(constant)(Real(2, 2, 0), Real(3, 2, 1)).value(), 3);
 }
 
-/* Parts of a formula may be kept by auto, and no type need be said; the run is the same to the last bit. */
+/* Parts of a formula may be stored by auto, and no type needs to be written; the run is the same to the last bit */
 TEST(UserFunctions, ARunWithLambdasWithoutTypes)
 {
   const double end = 2;
@@ -110,7 +110,7 @@ void expectDerivative(StateStep f, double x)
 {
   const double d = 1e-6;
   const auto   at = [&](double z) { return f(Real(z, 3, 1), 1, -2, 3, 5); };
-  EXPECT_NEAR(at(x).derivatives()(1), (at(x + d).value() - at(x - d).value()) / (2 * d), 1e-5) << x; /* at the ends of the cubic the second derivative jumps */
+  EXPECT_NEAR(at(x).derivatives()(1), (at(x + d).value() - at(x - d).value()) / (2 * d), 1e-5) << x; /* whose second derivative jumps at its ends */
   EXPECT_EQ(at(x).derivatives()(0), 0);
   EXPECT_EQ(at(x).derivatives().size(), 3);
 }
@@ -124,7 +124,7 @@ TEST(UserFunctions, StepsOfTheState)
     EXPECT_EQ(f(Real(0, 3, 1), 1, -2, 3, 5).value(), -2);
     EXPECT_EQ(f(Real(4, 3, 1), 1, -2, 3, 5).value(), 5);
     EXPECT_NEAR(f(Real(2, 3, 1), 1, -2, 3, 5).value(), 1.5, 1e-14);
-    EXPECT_TRUE(std::isnan(f(Real(2, 3, 1), 3, -2, 3, 5).value())); /* no width */
+    EXPECT_TRUE(std::isnan(f(Real(2, 3, 1), 3, -2, 3, 5).value())); /* zero width */
     EXPECT_EQ(f(Real(0.), 1, -2, 3, 5).derivatives().size(), 0);
   }
   const double s = 0.3;
@@ -151,7 +151,7 @@ TEST(UserFunctions, StepsOfTime)
   }
   const double s = 0.3, d = 1e-9;
   EXPECT_NEAR(cubic(1 + 2 * s).f, -2 + 7 * s * s * (3 - 2 * s), 1e-14);
-  EXPECT_NEAR(cubic(1 + d).f2, 6 * 7 / 4., 1e-6); /* jumps from 0 */
+  EXPECT_NEAR(cubic(1 + d).f2, 6 * 7 / 4., 1e-6); /* the second derivative jumps from 0 */
   EXPECT_NEAR(quintic(1 + d).f2, 0, 1e-6);
   EXPECT_NE(TimeFunction::step(1, 0, 1, 1).error(), "");
   EXPECT_NE(TimeFunction::step5(2, 0, 1, 1).error(), "");
