@@ -11,7 +11,7 @@ namespace hhtest
 struct Matrices {
   MatType  type  = MATAIJ;
   PetscInt block = 1;
-  enum { Same, Shell, Managed, Second } J = Same; /* Shell: PETSc applies the scalings; Managed: a shell that applies them itself; Second: another assembled matrix */
+  enum { Same, Shell, Managed, Second } J = Same; /* Shell: PETSc scales it; Managed: a shell that scales itself; Second: another assembled matrix */
   bool assembles = true;                            /* the application assembles its operator, like PETSc's examples */
 };
 

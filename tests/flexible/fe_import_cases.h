@@ -1,4 +1,4 @@
-/* What the tests of imported matrices share: dense matrices, their frequencies, files of a test */
+/* Shared by the tests of imported matrices: dense matrices, their frequencies, files of a test */
 #ifndef HHTDAE_TEST_FE_IMPORT_CASES_H
 #define HHTDAE_TEST_FE_IMPORT_CASES_H
 
@@ -29,8 +29,8 @@ inline Eigen::MatrixXd Dense(Mat A)
   return result;
 }
 
-/* Frequencies in cycles, ascending; of an unsupported model without the six rigid ones, or with the nodes of a set held. M x = (K + s M) x / (l + s):
-   M is singular where it is integrated with few points. */
+/* Frequencies in Hz, ascending; of an unsupported model without the six rigid-body modes, or with the nodes of a set
+   held. Solved as M x = (K + s M) x / (l + s), because M is singular where few integration points are used */
 inline std::vector<double> Frequencies(const FeModel &model, const std::vector<PetscInt> &held = {})
 {
   std::vector<Eigen::Index> rows;
@@ -57,7 +57,7 @@ inline double Difference(const std::vector<double> &a, const std::vector<double>
   return largest;
 }
 
-/* A folder of its own for the files of a test */
+/* A folder for the files of one test, removed by the destructor */
 class Folder
 {
 public:

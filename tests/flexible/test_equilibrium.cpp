@@ -1,4 +1,4 @@
-/* Static equilibrium of thin parts: large rotations in few corrections, and not at a state that is not stable. */
+/* Static equilibrium of thin parts: large rotations in few corrections, and no convergence to unstable states */
 #include "hhtdae/helpers.h"
 #include "box_model.h"
 #include "hhtdae/flexible.h"
@@ -11,7 +11,7 @@ using namespace hhtdae;
 namespace
 {
 
-/* A force that goes by nothing, in space axes */
+/* A constant force in space axes, given as an expression */
 void load(Scene &s, Marker tip, Vector3 force)
 {
   UserForce f;
@@ -20,7 +20,7 @@ void load(Scene &s, Marker tip, Vector3 force)
   s.add("load", f);
 }
 
-/* One metre along x, held at the left, of a square section */
+/* A beam of one metre along x with a square section, clamped at its left end */
 struct Plank {
   FeModel    model{PETSC_COMM_WORLD};
   FullFeBody fe;
@@ -52,7 +52,8 @@ struct Plank {
 
 } // namespace
 
-/* What rounding leaves of the forces of a stiff mesh moves a soft spring by more than any step at rest. By hand: m g L/2 cos(angle) = k angle. */
+/* The rounding errors of the forces of a stiff mesh move a soft spring by more than any tolerance of displacements.
+   Reference by hand: m g L/2 cos(angle) = k angle */
 TEST(Equilibrium, AStiffBodyOnASoftSpring)
 {
   for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
@@ -79,11 +80,12 @@ TEST(Equilibrium, AStiffBodyOnASoftSpring)
     double       angle  = 0;
     for (int k = 0; k < 50; k++) angle += (moment * std::cos(angle) - 30 * angle) / (moment * std::sin(angle) + 30);
     const Matrix3 A = DataOf(scene).bodies[fe.attachment("left").id].A;
-    EXPECT_NEAR(std::atan2(-A(2, 0), A(0, 0)), angle, 1e-3 * angle) << (law == FeLaw::Small ? "small" : "large"); /* and a bending of 1e-4 of it */
+    EXPECT_NEAR(std::atan2(-A(2, 0), A(0, 0)), angle, 1e-3 * angle) << (law == FeLaw::Small ? "small" : "large"); /* bending: 1e-4 of it */
   }
 }
 
-/* Positions of some 100 m leave rounding in the forces of a stiff mesh, here 1e-4 of the load, of which no step comes any nearer to zero */
+/* At positions of some 100 m the forces of a stiff mesh have rounding errors, here 1e-4 of the load, which no
+   correction can reduce */
 TEST(Equilibrium, AMeshFarFromTheOrigin)
 {
   for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
@@ -96,13 +98,14 @@ TEST(Equilibrium, AMeshFarFromTheOrigin)
   }
 }
 
-/* Bending far softer than stretching: every correction along a straight line leaves forces far above the load */
+/* Bending is far softer than stretching: after any correction along a straight line, the residual forces are far above
+   the load */
 TEST(Equilibrium, AThinPlankBentFar)
 {
   for (double depth : {0.02, 0.005}) {
     const double young = 2.1e11, EI = young * std::pow(depth, 4) / 12;
     const int    n     = 6;
-    /* bricks of 2^3 points are stiffer in bending: shear by 1 + (l/h)^2 G/E */
+    /* 8-node bricks with 2^3 points are too stiff in bending: shear increases the stiffness by the factor 1 + (l/h)^2 G/E */
     const double stiffer = 1 + 0.5 / std::pow(n * depth, 2);
     const Plank  p(n, depth, young, {0, 3 * stiffer * EI, 0});
     const double turn = std::atan2(p.axis()(1), p.axis()(0));
@@ -113,7 +116,8 @@ TEST(Equilibrium, AThinPlankBentFar)
   }
 }
 
-/* Pushed along its axis and a little aside: above the critical load there is a balance next to straight, not a stable one */
+/* A column under an axial force and a small lateral one: above the critical load the nearly straight equilibrium is
+   unstable and must not be the result */
 TEST(Equilibrium, AColumnBuckles)
 {
   const double depth = 0.1, young = 1e7, EI = young * std::pow(depth, 4) / 12;
@@ -133,7 +137,8 @@ TEST(Equilibrium, AColumnBuckles)
     }
 }
 
-/* Rigid pieces with beams between them, bent as the elastica of P L^2/EI = 3: 0.6033 across, 0.2544 along */
+/* Rigid pieces connected by beam elements, bent like the elastica of P L^2/EI = 3, whose tip moves by 0.6033 across
+   and 0.2544 along */
 TEST(Equilibrium, AChainOfBeamsBentFar)
 {
   const double depth = 0.02, young = 2.1e11, area = depth * depth, I = std::pow(depth, 4) / 12;
@@ -163,7 +168,7 @@ TEST(Equilibrium, AChainOfBeamsBentFar)
     }
     last = here;
   }
-  RigidBody pan; /* without it the search is an easy one */
+  RigidBody pan; /* makes the search harder */
   pan.mass     = 7850 * area;
   pan.inertia  = pan.mass * area * Matrix3::Identity();
   pan.position = {1, 0, 0};

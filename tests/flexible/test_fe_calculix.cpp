@@ -1,5 +1,5 @@
-/* Matrices that CalculiX stores, run on the spot: against its own frequencies and the mesh's matrices; and what is
- * refused. */
+/* Matrices stored by CalculiX, which is run by the test: compared with CalculiX's own frequencies and with the
+   matrices of the mesh; refused input */
 #include "fe_import_cases.h"
 #include "flexible/node_order.h"
 #include "hhtdae/flexible.h"
@@ -12,7 +12,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Rows of a model's matrix in the order of the labels */
+/* Matrix of a model with rows and columns in the order of node labels */
 Eigen::MatrixXd ByLabel(const FeModel &model, Mat A)
 {
   std::map<PetscInt, PetscInt> place;
@@ -23,8 +23,8 @@ Eigen::MatrixXd ByLabel(const FeModel &model, Mat A)
   return Dense(A)(rows, rows);
 }
 
-/* Mass of straight tetrahedra with the points of CalculiX' stiffness, one or four: too few for the square of their
- * functions */
+/* Mass matrix of straight tetrahedra with the integration points of CalculiX's stiffness (one or four), too few for
+   products of their shape functions */
 Eigen::MatrixXd FewPointsMass(const FeModel &model, double density)
 {
   const double    a = (5 + 3 * std::sqrt(5.)) / 20, b = (5 - std::sqrt(5.)) / 20;
@@ -56,7 +56,8 @@ Eigen::MatrixXd FewPointsMass(const FeModel &model, double density)
 
 bool HaveCcx() { return std::system("command -v ccx > /dev/null 2>&1") == 0; }
 
-/* Nodes, elements and the nodes of the surface "left" of a mesh in Gmsh's format 2.2 as a deck without a step */
+/* A CalculiX deck without a step, with the nodes, elements and the nodes of the surface "left" of a mesh in Gmsh's
+   format 2.2 */
 std::string DeckOf(const std::string &mesh, ElementType type, const std::string &name)
 {
   static const int   volume[] = {4, 11, 5, 17};
@@ -102,7 +103,7 @@ std::string DeckOf(const std::string &mesh, ElementType type, const std::string 
 
 const char *const store = "*STEP\n*FREQUENCY, SOLVER=MATRIXSTORAGE\n*END STEP\n";
 
-/* Eigenvalues that ccx prints */
+/* The eigenvalues that ccx prints */
 std::vector<double> PrintedByCcx(const std::string &dat)
 {
   std::istringstream  in(dat);
@@ -124,14 +125,14 @@ struct Sort {
   const char *name;
 };
 
-/* Without it GoogleTest prints all bytes, those between the members too */
+/* Without it GoogleTest would print all bytes, including padding */
 void PrintTo(const Sort &sort, std::ostream *out) { *out << sort.name; }
 
 class Calculix : public testing::TestWithParam<Sort>
 {
 };
 
-/* A 12-node-or-so bar written by hand: two tetrahedra */
+/* Two tetrahedra, written by hand */
 const char *const two_tetrahedra =
     "*NODE, NSET=all\n11,0,0,0\n12,1,0,0\n13,0,1,0\n14,0,0,1\n15,1,1,1\n99,5,5,5\n*ELEMENT, TYPE=C3D4, "
     "ELSET=e\n1,11,12,13,14\n2,12,13,14,15\n"
@@ -169,7 +170,7 @@ TEST_P(Calculix, FrequenciesAsPrintedAndAsFromTheMesh)
   ASSERT_EQ(printed.size(), 10u);
   EXPECT_LT(Difference(held, printed, 10), 1e-6);
   must(door.readMesh(file, {{"", Material{2.1e11, 0.3, 7850}}}));
-  /* CalculiX integrates the mass of tetrahedra with the points of their stiffness, which the mesh's door does not */
+  /* CalculiX integrates the mass of tetrahedra with the points of the stiffness; the reader of meshes does not */
   const bool   bricks    = sort.type == ElementType::Brick8 || sort.type == ElementType::Brick20;
   const double stiffness = Difference(ByLabel(model, model.K), ByLabel(door, door.K)),
                mass      = Difference(ByLabel(model, model.M), ByLabel(door, door.M)),
@@ -190,7 +191,7 @@ TEST_P(Calculix, FrequenciesAsPrintedAndAsFromTheMesh)
   ASSERT_EQ(model.sets.count("Left"), 1u);
   ASSERT_EQ(door.sets.count("left"), 1u);
   EXPECT_EQ(model.sets["Left"].size(), door.sets["left"].size());
-  EXPECT_EQ(model.sets["Nall"].size(), (std::size_t)model.nodes); /* the node that no element has is left out */
+  EXPECT_EQ(model.sets["Nall"].size(), (std::size_t)model.nodes); /* the node without elements is left out */
   EXPECT_GE(model.sets["both"].size(), model.sets["Left"].size());
   for (PetscInt n : model.sets["Left"]) EXPECT_EQ(model.coordinates[3 * (std::size_t)n], 0);
   ASSERT_EQ(model.materials.size(), 1u);
@@ -202,7 +203,7 @@ TEST_P(Calculix, FrequenciesAsPrintedAndAsFromTheMesh)
     for (int c = 0; c < 3; c++)
       EXPECT_NEAR(model.coordinates[3 * (std::size_t)i + (std::size_t)c],
                   door.coordinates[3 * (std::size_t)by_label.at(model.label[(std::size_t)i]) + (std::size_t)c], 1e-15);
-  /* middles of edges are where Gmsh's order has them: each is between two corners */
+  /* middle nodes are in Gmsh's order: each lies between its two corners */
   for (const FeElement &e : model.elements) {
     std::set<std::vector<PetscInt>> known;
     for (const FeElement &d : door.elements) {
@@ -245,7 +246,8 @@ TEST(Calculix, IncompatibleModesHaveNodesOfTheirOwn)
   EXPECT_SAYS(Refused(folder.name + "/brick"), "and C3D8I, which are not read; take C3D20");
 }
 
-/* Whose mass is singular: at the points of integration the square of y is a constant. Free modes, and those beside a rigid end, against the ones that ccx prints. */
+/* A mesh whose mass matrix is singular, because y^2 is the same at all integration points. Free modes, and modes with
+   a rigid end, are compared with those that ccx prints */
 TEST(Calculix, OneReducedElementAcross)
 {
   if (!HaveCcx()) GTEST_SKIP() << "ccx is not installed";
@@ -275,7 +277,8 @@ TEST(Calculix, OneReducedElementAcross)
   }
 }
 
-/* Point masses, springs and wedges are in the matrices alone: what needs elements does without them by no accident. Reduced elements are taken as they are. */
+/* Point masses, springs and wedges are only in the matrices. Functions that need the elements refuse such models;
+   those with reduced-integration elements are accepted */
 TEST(Calculix, ElementsThatAreNotAllOfTheModel)
 {
   if (!HaveCcx()) GTEST_SKIP() << "ccx is not installed";
@@ -314,7 +317,7 @@ TEST(Calculix, RefusesDamage)
   folder.write("two.inp", std::string(two_tetrahedra) + store);
   ASSERT_TRUE(folder.ccx("two"));
   {
-    FeModel model(PETSC_COMM_SELF); /* the name of the deck serves too */
+    FeModel model(PETSC_COMM_SELF); /* the name of the deck is accepted as well */
     must(model.readCalculix(folder.name + "/two.inp"));
     EXPECT_EQ(model.nodes, 5);
     EXPECT_EQ(model.label, (std::vector<PetscInt>{11, 12, 13, 14, 15}));
@@ -358,7 +361,7 @@ TEST(Calculix, RefusesDamage)
   EXPECT_SAYS(Refused(stem), "two.mas");
 }
 
-/* Rows of the stored matrices in any order */
+/* The rows of the stored matrices may be in any order */
 TEST(Calculix, OrderOfRows)
 {
   if (!HaveCcx()) GTEST_SKIP() << "ccx is not installed";

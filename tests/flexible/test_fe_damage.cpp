@@ -1,4 +1,5 @@
-/* What readers of finite-element models refuse, and what they take with few bytes that ask for much; tests/fuzz has the rest. */
+/* What readers of finite-element models refuse, and how they handle small files that request much memory or time;
+   tests/fuzz has further cases */
 #include "fe_import_cases.h"
 #include "hhtdae/flexible.h"
 #include "reduced_body.h"
@@ -12,7 +13,7 @@ namespace
 
 const char *const six_by_six = "1 1 4\n2 2 4\n3 3 4\n4 4 4\n5 5 4\n6 6 4\n4 1 -1\n";
 
-/* The first coordinate of a list of nodes, and "refused" otherwise */
+/* The first coordinate of a list of nodes, or "refused" */
 std::string Coordinate(const Folder &folder, const std::string &word)
 {
   FeModel   model(PETSC_COMM_SELF);
@@ -47,7 +48,7 @@ std::string BoxMesh(bool four)
   return MeshWriter(box).text(four);
 }
 
-/* Two tetrahedra with matrices of some numbers, and what is added to the deck */
+/* Files of two tetrahedra with some matrix entries, and additions to the deck */
 struct Job {
   Folder folder;
 
@@ -83,7 +84,7 @@ struct Job {
   }
 };
 
-/* A file of PETSc's with three rows of two entries each */
+/* A PETSc binary file of three rows with two entries each */
 struct Binary {
   int    head[4]   = {1211216, 6, 6, 12};
   int    length[6] = {2, 2, 2, 2, 2, 2};
@@ -145,7 +146,7 @@ TEST(Damage, NumbersOfMeshes)
   }
 }
 
-/* Numbers of groups are 32 bits wide in Gmsh */
+/* Group numbers in Gmsh have 32 bits */
 TEST(Damage, LargePhysicalTags)
 {
   const std::string tag = "1073741825", other = "2147483647"; /* 2^30 + 1, 2^31 - 1 */
@@ -159,11 +160,11 @@ TEST(Damage, LargePhysicalTags)
   EXPECT_EQ(large.sets, straight.sets);
   EXPECT_EQ(large.sets["left"].size(), 4u);
   EXPECT_SAYS(RefusedMesh(Replaced(mesh, " 3 2 " + other, " 3 2 -2147483648")), "32 bits");
-  FeModel tags(PETSC_COMM_SELF); /* of nodes */
+  FeModel tags(PETSC_COMM_SELF); /* tags of nodes */
   must(readText(tags, Replaced(BoxMesh(false), "1000000 9", "2147483647 9")));
 }
 
-/* Elements on one face are told apart before their pairs are listed. */
+/* Several elements on one face are detected before all pairs of them are listed */
 TEST(Damage, ManyElementsOnOneFace)
 {
   std::string       mesh = BoxMesh(true), copies;
@@ -254,7 +255,7 @@ TEST(Damage, PetscBinary)
   EXPECT_SAYS(ReadBinary(folder, b), "truncated");
 }
 
-/* PETSc would add them up. */
+/* Duplicate entries are refused, because PETSc would add them */
 TEST(Damage, EntriesGivenTwice)
 {
   Folder folder;

@@ -22,7 +22,7 @@ TYPED_TEST_SUITE(FeElements, Shapes);
 
 template <class Shape> constexpr bool quadratic() { return Shape::nodes > Shape::corners; }
 
-/* The reference element under an affine map, with straight edges; corners: by how much they are moved out of it */
+/* The reference element under an affine map, with straight edges; corners, middles: random displacements of these nodes */
 template <class Shape> fe::NodeVectors<Shape> element(double corners = 0, double middles = 0)
 {
   Matrix3d A;
@@ -46,7 +46,7 @@ template <class Shape, class F> fe::NodeVectors<Shape> field(const fe::NodeVecto
   return u;
 }
 
-/* What the elements give as a matrix of any size: arithmetic of the tests for matrices of each of their sizes takes a minute to compile */
+/* The elements' results as matrices of dynamic size: compiling the tests' arithmetic for each fixed size takes a minute */
 template <int Rows, int Columns, int Options> Eigen::Map<const Eigen::MatrixXd> any(const Eigen::Matrix<double, Rows, Columns, Options> &m)
 {
   static_assert(!(Options & Eigen::RowMajor), "by columns");
@@ -95,8 +95,7 @@ TYPED_TEST(FeElements, GradientsAreDerivatives)
 TYPED_TEST(FeElements, FacesAndEdgesBelongToThePlaces)
 {
   using S = TypeParam;
-  /* corners of a face lie in one plane, which the centre of the element lies on one side of, in Gmsh's orientation
-   * outwards */
+  /* the corners of a face lie in one plane; in Gmsh's orientation its normal points away from the centre of the element */
   Vector3d centre = Vector3d::Zero();
   for (int i = 0; i < S::corners; i++) centre += S::corner(i) / S::corners;
   for (int f = 0; f < S::faces; f++) {
@@ -109,7 +108,7 @@ TYPED_TEST(FeElements, FacesAndEdgesBelongToThePlaces)
   }
 }
 
-/* Monomials over the reference element */
+/* Integration rules are exact for monomials over the reference element */
 TYPED_TEST(FeElements, RulesAreExact)
 {
   using S              = TypeParam;
@@ -153,7 +152,7 @@ TYPED_TEST(FeElements, StiffnessHasSixRigidMotionsAndNoOther)
   }
 }
 
-/* A field of constant strain: nodal forces are those of its stress on the faces, the energy that of the volume */
+/* A field of constant strain: nodal forces are those of the stress on the faces, the energy is that of the volume */
 TYPED_TEST(FeElements, ConstantStrain)
 {
   using S                    = TypeParam;
@@ -167,7 +166,7 @@ TYPED_TEST(FeElements, ConstantStrain)
   const Matrix3d                    e = (D + D.transpose()) / 2;
   const double                      density =
       (s[0] * e(0, 0) + s[1] * e(1, 1) + s[2] * e(2, 2)) / 2 + s[3] * e(0, 1) + s[4] * e(1, 2) + s[5] * e(2, 0);
-  double      volume = 0; /* at the stiffness' own points: exact unless edges are curved */
+  double      volume = 0; /* with the integration points of the stiffness: exact unless edges are curved */
   const auto &table  = fe::Table<S, typename S::StiffnessRule>::get();
   for (size_t q = 0; q < table.d.size(); q++)
     volume += table.points.weight[q] * Matrix3d(any(X) * any(table.d[q]).transpose()).determinant();
@@ -178,11 +177,11 @@ TYPED_TEST(FeElements, ConstantStrain)
   for (int i = 0; i < S::nodes; i++) EXPECT_LT((at.col(i) - s).norm(), 1e-12 * s.norm()) << i;
 }
 
-/* Strains that are linear, where the element knows them: displacements of degree two on a parallelepiped */
+/* Elements of degree two reproduce linear strains: displacements of degree two on a parallelepiped */
 TYPED_TEST(FeElements, LinearStress)
 {
   using S = TypeParam;
-  if (!quadratic<S>()) return; /* a linear element has constant strains, see above */
+  if (!quadratic<S>()) return; /* linear elements have constant strains, see above */
   const fe::NodeVectors<S> X = element<S>();
   const auto               u = [](Vector3d x) {
     return Vector3d(x[0] * x[1] + x[2] * x[2], x[0] * x[0] - x[1] * x[2], 2 * x[0] * x[2] + x[1] * x[1]);
@@ -197,14 +196,14 @@ TYPED_TEST(FeElements, LinearStress)
   for (int i = 0; i < S::nodes; i++) EXPECT_LT((at.col(i) - stressOf(der(X.col(i)))).norm(), 1e-12) << i;
 }
 
-/* Mass, first and second moments of a field that the element holds exactly, against those of the polyhedron itself */
+/* Mass, first and second moments of a field that the element reproduces exactly, against those of the polyhedron */
 TYPED_TEST(FeElements, MassAndMoments)
 {
   using S                    = TypeParam;
   const fe::NodeVectors<S> X = element<S>(S::corners == 8 ? .1 : 0);
   fe::Mass<S>              m;
   fe::ElementMass<S>(X, steel.density, m);
-  /* the same integrals over the element's corners alone, with more points than it takes */
+  /* the same integrals over the corners only, with more points than the element uses */
   using Linear                          = std::conditional_t<S::corners == 4, fe::Tetrahedron4, fe::Brick8>;
   using Rule                            = std::conditional_t<S::corners == 4, fe::TetrahedronRule15, fe::BrickRule<4>>;
   const fe::NodeVectors<Linear> corners = X.template leftCols<S::corners>();
@@ -226,7 +225,7 @@ TYPED_TEST(FeElements, MassAndMoments)
   EXPECT_GT(e[0], 1e-4 * e[e.size() - 1]);
 }
 
-/* All entries of the mass matrix: a rule of a higher degree gives the same */
+/* All entries of the mass matrix equal those of a rule of higher degree */
 TYPED_TEST(FeElements, MassIsIntegratedExactly)
 {
   using S                    = TypeParam;
@@ -234,7 +233,7 @@ TYPED_TEST(FeElements, MassIsIntegratedExactly)
   fe::Mass<S>              m;
   Eigen::MatrixXd          again = Eigen::MatrixXd::Zero(S::nodes, S::nodes);
   fe::ElementMass<S>(X, 1, m);
-  /* Gauss in five directions, for a tetrahedron collapsed onto it */
+  /* Gauss rule in each direction, collapsed for a tetrahedron */
   const double x5[5] = {0, .5384693101056831, -.5384693101056831, .9061798459386640, -.9061798459386640};
   const double w5[5] = {.5688888888888889, .4786286704993665, .4786286704993665, .2369268850561891, .2369268850561891};
   for (int i = 0; i < 5; i++)
@@ -270,7 +269,7 @@ TYPED_TEST(FeElements, InvertedAndFlatElementsAreSeen)
     EXPECT_FALSE(fe::ElementMass<S>(x, 1, m) > fe::degenerate);
     EXPECT_FALSE(fe::StressAtNodes<S>(x).least() > fe::degenerate);
   }
-  /* thin as foil is no error */
+  /* a very thin element is not an error */
   fe::NodeVectors<S> thin = X;
   thin.row(2) *= 1e-6;
   EXPECT_GT(fe::ElementStiffness<S>(thin, fe::Lame(steel), K), fe::degenerate);
@@ -314,7 +313,7 @@ TYPED_TEST(FeElements, ForceIsDerivativeOfEnergyAndTangentOfForce)
   EXPECT_EQ((any(T) - any(T).transpose()).norm(), 0);
 }
 
-/* The force alone takes four points at a time */
+/* The function for forces without tangent, which processes four points at a time, gives the same forces */
 TYPED_TEST(FeElements, ForceAloneIsThatOfTheTangent)
 {
   using S                    = TypeParam;

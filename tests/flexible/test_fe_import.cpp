@@ -1,4 +1,4 @@
-/* Matrices of other programs: Matrix Market, Abaqus' rows, PETSc's binary, memory; and what is refused. */
+/* Matrices of other programs: Matrix Market, Abaqus, PETSc's binary format, memory; refused input */
 #include "fe_import_cases.h"
 #include "hhtdae/flexible.h"
 #include "reduced_body.h"

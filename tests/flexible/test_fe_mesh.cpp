@@ -1,4 +1,4 @@
-/* Meshes: what is read from Gmsh's files, K and M, stress at nodes, and the errors. */
+/* Meshes: reading of Gmsh's files, K and M, stress at nodes, errors */
 #include "fe_mesh.h"
 #include "flexible/element.h"
 
@@ -18,7 +18,7 @@ class FeMesh : public testing::TestWithParam<ElementType>
 };
 INSTANTIATE_TEST_SUITE_P(Types, FeMesh, testing::ValuesIn(types));
 
-/* Inner nodes of the unit box moved, faces left */
+/* Moves the inner nodes of the unit box and leaves its faces plane */
 Vector3 bent(const Vector3 &x)
 {
   const double inside = 40 * x[0] * (1 - x[0]) * x[1] * (1 - x[1]) * x[2] * (1 - x[2]);
@@ -32,7 +32,7 @@ bool onSurface(const double *x)
   return false;
 }
 
-/* Displacement fields as a body's modes */
+/* A body whose modes are these displacement fields */
 template <class... F> ReducedBody bodyOf(const FeModel &model, F &&...fields)
 {
   ReducedBody body;
@@ -66,7 +66,7 @@ std::string replaced(std::string text, const std::string &from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-/* The message of an error that has to come */
+/* The message of an error that must occur */
 std::string refusal(const std::string &text, const Materials &materials = {{"", softSteel()}})
 {
   FeModel   model(PETSC_COMM_SELF);
@@ -110,10 +110,10 @@ TEST_P(FeMesh, MatricesAreAsAgreed)
   MeshBox     box{GetParam(), 3, 2, 2};
   FeModel model(PETSC_COMM_SELF);
   must(readBox(model, box));
-  const PetscInt brick20 = 36 + 3 * 9 + 2 * 4 * 3 + 2 * 4 * 3; /* corners and edges along x, y, z */
+  const PetscInt brick20 = 36 + 3 * 9 + 2 * 4 * 3 + 2 * 4 * 3; /* corners; then middle nodes of edges along x, y, z */
   EXPECT_EQ(model.nodes, box.type == ElementType::Brick20 ? brick20
                          : box.quadratic()                ? 7 * 5 * 5
-                                                          : 4 * 3 * 3); /* one is unused */
+                                                          : 4 * 3 * 3); /* one node is unused */
   EXPECT_EQ(model.own, model.nodes);
   EXPECT_EQ(model.first, 0);
   EXPECT_EQ((PetscInt)model.label.size(), model.own);
@@ -126,7 +126,7 @@ TEST_P(FeMesh, MatricesAreAsAgreed)
     EXPECT_EQ(info.mallocs, 0);
     EXPECT_EQ(info.nz_allocated, info.nz_used);
     must(MatSetOption(A, MAT_SYMMETRY_ETERNAL, PETSC_FALSE));
-    must(MatSetOption(A, MAT_SYMMETRIC, PETSC_FALSE)); /* so that PETSC looks at the entries */
+    must(MatSetOption(A, MAT_SYMMETRIC, PETSC_FALSE)); /* makes PETSc compare the entries */
     Mat T;
     must(MatTranspose(A, MAT_INITIAL_MATRIX, &T));
     PetscReal norm;
@@ -171,7 +171,8 @@ TEST_P(FeMesh, SetsAndLabels)
   }
 }
 
-/* Gmsh counts groups of each dimension from one: those of one number or name are not one set */
+/* Gmsh numbers the groups of each dimension from one: groups of different dimension with the same number or name are
+   different sets */
 TEST(FeMeshFiles, GroupsOfOneName)
 {
   const MeshBox box{ElementType::Brick8, 3, 2, 2, 1.5};
@@ -193,7 +194,7 @@ TEST(FeMeshFiles, GroupsOfOneName)
     }
 }
 
-/* Nodes on the surface follow a linear field; those inside, in a mesh of no regularity, find it */
+/* Patch test: with a linear field prescribed on the surface, the inner nodes of an irregular mesh take the same linear field */
 TEST_P(FeMesh, PatchTest)
 {
   const MeshBox box{GetParam(), 3, 3, 3, 1, 1, 1, false, bent};
@@ -253,7 +254,7 @@ TEST(FeMeshFiles, BinaryIsTheSameAsText)
   MeshFile geo(PETSC_COMM_SELF, geometry, ".geo");
   PetscReal     norm[6];
   int           k = 0;
-  for (const char *format : {"msh41", "msh22", "msh41 -bin", "msh22 -bin", "msh41 -part 3", "msh41 -bin -part 3"}) { /* elements of partitions are in entities of their own */
+  for (const char *format : {"msh41", "msh22", "msh41 -bin", "msh22 -bin", "msh41 -part 3", "msh41 -bin -part 3"}) { /* each partition has its own entities */
     MeshFile     mesh(PETSC_COMM_SELF, "");
     const std::string command =
         "gmsh -v 0 -3 -order 2 -format " + std::string(format) + " -o " + mesh.name + " " + geo.name;
@@ -263,7 +264,7 @@ TEST(FeMeshFiles, BinaryIsTheSameAsText)
     must(MatNorm(model.K, NORM_FROBENIUS, &norm[k]));
     EXPECT_NEAR(norm[k], norm[0], 1e-12 * norm[0]) << format;
     EXPECT_EQ((PetscInt)model.sets["rod"].size(), model.nodes);
-    /* a curved mesh of degree two: the circle to a few parts in ten thousand */
+    /* a curved mesh of degree two approximates the circle to a few parts in ten thousand */
     Vec          one = fieldOf(model, [](Vector3) { return Vector3(1, 0, 0); }), M1 = product(model.M, one);
     const double mass = softSteel().density * PETSC_PI / 2;
     EXPECT_NEAR(dot(one, M1), mass, 5e-3 * mass);
@@ -276,7 +277,7 @@ TEST(FeMeshFiles, BinaryIsTheSameAsText)
   }
 }
 
-/* Linear and quadratic tetrahedra and bricks in one file: their faces do not match, so that they lie apart */
+/* Linear and quadratic tetrahedra and bricks in one file; since their faces do not match, they are separate bodies */
 TEST(FeMeshFiles, MixedElements)
 {
   const std::string text = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n2 12 1 12\n3 1 0 "
@@ -337,12 +338,12 @@ TEST_P(FeMesh, BendingStressIsRecovered)
   if (box.quadratic())
     EXPECT_LT(worst, 1e-12);
   else {
-    EXPECT_LT(mean, .35); /* first order; the largest stress is 1 */
+    EXPECT_LT(mean, .35); /* of first order; the largest stress is 1 */
     EXPECT_GT(worst, 1e-3);
   }
 }
 
-/* Two materials in a row under one strain: the stiffer one's stress where they meet */
+/* Two materials in a row with equal strain: at the boundary the stress is that of the stiffer one */
 TEST(FeMeshStress, StifferSideOfABoundary)
 {
   for (bool stiff_first : {true, false}) {
@@ -405,7 +406,7 @@ TEST(FeMeshErrors, Files)
   EXPECT_MESH_SAYS(refusal("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"), "no section $Nodes");
 }
 
-/* A file that is cut off anywhere is refused, and nothing worse happens */
+/* A file that is truncated anywhere is refused with an error */
 TEST(FeMeshErrors, CutOff)
 {
   for (bool four : {true, false}) {
@@ -437,7 +438,7 @@ TEST(FeMeshErrors, Elements)
   EXPECT_MESH_SAYS(refusal(replaced(text, "3 5 4 6\n", "3 5 4 7\n")), "should be $EndElements");
   /* a flat element */
   EXPECT_MESH_SAYS(refusal(replaced(text, "\n6 1 3 9 27", "\n6 1 3 9 7")), "has no volume");
-  /* an element twice */
+  /* a duplicate element */
   const size_t      a = text.rfind("\n7 ") + 2, b = text.rfind("\n8 ");
   const std::string second = text.substr(a, b - a);
   EXPECT_MESH_SAYS(refusal(replaced(text, "\n6 1 3 9 27 ", "\n6" + second)), "elements 6, 7 and 10 share one face");

@@ -1,4 +1,4 @@
-/* A finite-element model as it is in a scene: Jacobian against differences, rigid motion, ties, refusals. */
+/* A whole finite-element model in a scene: Jacobian against differences, rigid motion, ties, refused input */
 #include "box_model.h"
 #include "hhtdae/analyses.h"
 #include "hhtdae/flexible.h"
@@ -30,7 +30,7 @@ FullBody placed(FeLaw law)
   return b;
 }
 
-/* Held by a rigid attachment on a ball joint, an average carries a rigid body and a spring */
+/* Rigid attachment on a ball joint; averaging attachment with a rigid body and a spring */
 struct Held {
   Beam8      beam;
   Scene      scene{PETSC_COMM_WORLD};
@@ -75,7 +75,7 @@ TEST(FullBody, JacobianAgainstDifferences)
   }
 }
 
-/* A turn at large strains nothing; neither does a small displacement that is rigid to first order */
+/* Neither a large rotation (law large) nor a displacement that is rigid to first order (law small) causes strain */
 TEST(FullBody, RigidMotionMakesNoForce)
 {
   for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
@@ -103,7 +103,8 @@ TEST(FullBody, RigidMotionMakesNoForce)
   }
 }
 
-/* A body of law small that turns by more than 0.1 rad about its length, or across it, is told once */
+/* A body with small displacements (law small) that turns by more than 0.1 rad about its length, or across it, is
+   reported once */
 TEST(FullBody, TurnsTooFarForSmallDisplacements)
 {
   struct Case {
@@ -126,7 +127,7 @@ TEST(FullBody, TurnsTooFarForSmallDisplacements)
     must(TSSetMaxTime(ts, c.angle));
     must(TSSetTolerances(ts, 1e-5, nullptr, 1e-5, nullptr));
     must(TSGetAdapt(ts, &adapt));
-    must(TSAdaptSetStepLimits(adapt, PETSC_DEFAULT, 0.02)); /* it is told between steps */
+    must(TSAdaptSetStepLimits(adapt, PETSC_DEFAULT, 0.02)); /* reports come at the ends of steps */
     testing::internal::CaptureStdout();
     must(scene.solve(ts));
     const std::string said = testing::internal::GetCapturedStdout();
@@ -140,7 +141,7 @@ TEST(FullBody, TurnsTooFarForSmallDisplacements)
   }
 }
 
-/* The position of a marker on a frame follows what its nodes do: ties are met, and average what they say */
+/* The constraints that tie attachment frames to nodes are satisfied at the start, for rigid and averaging attachments */
 TEST(FullBody, TiesHold)
 {
   Held        h(FeLaw::Large);
@@ -156,7 +157,8 @@ TEST(FullBody, TiesHold)
 namespace
 {
 
-/* A cantilever in static equilibrium under a force at its tip across it: how far that goes along the force, and where its marker is */
+/* A cantilever in static equilibrium under a lateral force at its tip; returns the displacement along the force and
+   the motion of the tip's marker */
 double deflection(const Box &box, FeLaw law, double force, Motion *x, Matrix3 *axes)
 {
   FeModel  model(PETSC_COMM_WORLD);
@@ -186,8 +188,9 @@ double deflection(const Box &box, FeLaw law, double force, Motion *x, Matrix3 *a
 
 } // namespace
 
-/* A rigid attachment of a body with small displacements turns to first order, as the body is bent: deflections go with the load. An exact turn would strain the
-   face by half its square, which K holds against it: 7 % less deflection here, at a turn of 0.03. */
+/* A rigid attachment of a body with small displacements rotates to first order, consistent with the linear bending, so
+   that deflections are proportional to the load. With an exact rotation the face would be strained by half the square
+   of the angle, against the stiffness K: 7 % less deflection here, at an angle of 0.03 */
 TEST(FullBody, SmallDisplacementsAreLinear)
 {
   const Box    box{{20, 2, 2}, {2, 0.04, 0.02}, {1e9, 0.3, 1000}};
@@ -198,7 +201,7 @@ TEST(FullBody, SmallDisplacementsAreLinear)
   EXPECT_NEAR(much, 100 * little, 1e-3 * much);
 }
 
-/* Where nothing but rounding is to be balanced it is found to be, and next to nothing bends as far as it should */
+/* If only rounding errors remain the state counts as equilibrium, and a tiny load causes the right deflection */
 TEST(FullBody, UnloadedInEquilibrium)
 {
   const Box box{{6, 1, 1}, {1, 0.1, 0.1}, {2e11, 0.3, 7800}};
@@ -212,7 +215,7 @@ TEST(FullBody, UnloadedInEquilibrium)
   }
 }
 
-/* Where no step has been made the nodes are where the run stands: at the start, and in the shape of static equilibrium */
+/* Node positions before the first step are those of the present state: at the start, and after static equilibrium */
 TEST(FullBody, PositionsBeforeTheFirstStep)
 {
   const double L = 2, g = 9.81;
@@ -223,7 +226,7 @@ TEST(FullBody, PositionsBeforeTheFirstStep)
     FullFeBody fe;
     b.law         = law;
     b.attachments = {{"left"}};
-    scene.gravity({g, 0, 0}); /* along the beam */
+    scene.gravity({g, 0, 0}); /* gravity along the beam */
     must(fe.add(scene, "beam", beam.model, b));
     const Marker left = scene.marker(fe.attachment("left"));
     const auto   l    = DataOf(scene).frame(left);
@@ -242,7 +245,7 @@ TEST(FullBody, PositionsBeforeTheFirstStep)
   }
 }
 
-/* By the body's name, with the attachments that there are */
+/* The error has the name of the body and lists its attachments */
 TEST(FullBody, UnknownAttachment)
 {
   Beam8      beam;
@@ -257,7 +260,8 @@ TEST(FullBody, UnknownAttachment)
   EXPECT_TRUE(trap.says("finite-element body beam: it has no attachment middle, but left, right")) << trap.message;
 }
 
-/* Nodes that were not merged: the part that nothing holds falls away, and is told. Attachments of any kind hold what their nodes belong to. */
+/* A mesh in two parts whose nodes were not merged: a part that nothing holds is reported. An attachment of any kind
+   connects the parts that its nodes belong to */
 TEST(FullBody, PartsAreTold)
 {
   FeModel model{PETSC_COMM_WORLD};
@@ -278,7 +282,7 @@ TEST(FullBody, PartsAreTold)
   }
 }
 
-/* What was refused is not described again with other parameters, and leaves nothing in the scene */
+/* A body that was refused leaves nothing in the scene and is not described again when parameters change */
 TEST(FullBody, ARefusedBodyIsForgotten)
 {
   Beam8      beam;

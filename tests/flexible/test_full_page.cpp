@@ -1,4 +1,4 @@
-/* Surfaces of whole finite-element bodies: thinned ones keep their shape, stress in a page is what the load makes. */
+/* Surfaces of whole finite-element bodies: coarsened surfaces keep their shape; the stress in a page is that of the load */
 #include "fe_mesh.h"
 #include "flexible/surface.h"
 #include "scene_output.h"
@@ -12,7 +12,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Volume inside of the triangles */
+/* Volume enclosed by the triangles */
 double volume(const std::vector<double> &point, const std::vector<int> &triangle)
 {
   double     sum = 0;
@@ -33,7 +33,7 @@ TEST(ThinSurface, KeepsTheShape)
     box.ny   = 8;
     box.nz   = 4;
     box.lx   = 5;
-    box.lz   = 0.2; /* thin: its two sides must not become one */
+    box.lz   = 0.2; /* thin: its two sides must not be merged */
     FeModel                  model(PETSC_COMM_SELF);
     std::vector<PetscInt>    node;
     std::vector<int>         triangle;
@@ -53,7 +53,8 @@ TEST(ThinSurface, KeepsTheShape)
   }
 }
 
-/* However long the edges of cells are, there is a cluster for each side of the body: the search for fewer came to no end */
+/* However large the cells of the coarsening are, each side of the body keeps at least one cluster; the search for
+   fewer clusters had not ended */
 TEST(ThinSurface, OfFewNodes)
 {
   for (const std::size_t most : {1, 3, 6, 20}) {
@@ -76,7 +77,8 @@ TEST(ThinSurface, OfFewNodes)
 
 #if defined(HHTDAE_PAGE)
 
-/* A bar without lateral contraction under tension: the stress is force over area everywhere, Cauchy's at large strains as well */
+/* A bar without lateral contraction under tension: the stress is force over area everywhere, and at large strains the
+   Cauchy stress */
 TEST(FullPage, StressOfABarUnderTension)
 {
   for (FeLaw law : {FeLaw::Small, FeLaw::Large})
@@ -102,7 +104,7 @@ TEST(FullPage, StressOfABarUnderTension)
       scene.add("pull", UserForce{right, {}, {}, {Expression{{}, [](const Real *) { return Real(2400.); }}, Expression{{}, [](const Real *) { return Real(0.); }}, Expression{{}, [](const Real *) { return Real(0.); }}}, {}});
       SceneRun run(scene, 1e-4, fixedSteps(1e-4) + "-scene_equilibrium -scene_page_frames 1 -scene_page " + file.name);
       must(run.solve());
-      const std::size_t nodes = 5 * 9 - 3; /* corners alone */
+      const std::size_t nodes = 5 * 9 - 3; /* corner nodes only */
       const PageFile    page(file.text(), 21, 0, {}, {{nodes, true}});
       for (double s : page.stress[0]) EXPECT_NEAR(s, 2400 / 0.06, 0.005 * 2400 / 0.06);
       double longer = 0;

@@ -1,4 +1,4 @@
-/* Stress out of modal coordinates: von Mises, the highest places of a run, fields that ParaView's library reads. */
+/* Stress from modal coordinates: von Mises stress, highest values of a run, fields for ParaView's library */
 #include "flexible/node_order.h"
 #include "hhtdae/flexible.h"
 #include "reduced_body.h"
@@ -9,7 +9,7 @@ using namespace hhtest;
 namespace
 {
 
-/* One mode for each component of stress, at one node */
+/* One node with a stress mode for each component of stress */
 ReducedBody SixModes()
 {
   HandMade    made(PETSC_COMM_SELF, 1, 6);
@@ -51,7 +51,7 @@ TEST(VonMises, KnownStates)
     s[(std::size_t)shear] = 2;
     EXPECT_DOUBLE_EQ(OfOne(body, s), 2 * std::sqrt(3.));
   }
-  /* invariant under a turn of the axes */
+  /* invariant under a rotation of the axes */
   const Matrix3 q = Eigen::AngleAxisd(0.9, Vector3(1, -2, 0.5).normalized()).toRotationMatrix();
   Matrix3       t;
   t << 4, 1, -2, 1, -3, 0.5, -2, 0.5, 6;
@@ -78,7 +78,7 @@ TEST(VonMises, Refuses)
   EXPECT_NE(hot.add(0, eta), 0);
 }
 
-/* The whole history kept, and sorted by hand, gives the same places */
+/* The result equals that of storing and sorting the whole history */
 TEST(HotSpots, AgainstTheHistory)
 {
   HandMade             made(PETSC_COMM_SELF, 40, 5);
@@ -115,10 +115,10 @@ TEST(HotSpots, AgainstTheHistory)
       if (i == best || (x - y).norm() < distance) taken[i] = 1;
     }
   }
-  for (char t : taken) EXPECT_TRUE(t); /* all were asked for */
+  for (char t : taken) EXPECT_TRUE(t); /* all nodes were asked for */
 }
 
-/* More nodes and states than are looked at together, against Eigen's product and the norm of the deviator */
+/* More nodes and states than one block processes, against Eigen's product and the norm of the deviator */
 TEST(HotSpots, AgainstEigensProduct)
 {
   HandMade             made(PETSC_COMM_SELF, 150, 5);
@@ -171,15 +171,14 @@ TEST(HotSpots, TiesByLabelFirstTimeAndNothingYet)
   EXPECT_NE(hot.highest(3, -1, &spots), 0);
   must(hot.add(4, Eigen::VectorXd::Constant(1, 5)));
   made.body.stress = StressModes();
-  EXPECT_NE(hot.highest(3, 1, &spots), 0); /* of a state that waits, and of stress modes that have gone */
+  EXPECT_NE(hot.highest(3, 1, &spots), 0); /* the last state is still buffered, but the stress modes are gone */
   EXPECT_TRUE(trap.says("changed")) << trap.message;
   HotSpots none(made.body);
   EXPECT_NE(none.highest(3, 1, &spots), 0);
   EXPECT_TRUE(trap.says("AddStressModes")) << trap.message;
 }
 
-/* Middles of edges in Gmsh's order, after VTK's order is applied, are in the middle of the edges that VTK's order says
- */
+/* In VTK's order of nodes, each middle node of an edge, taken from Gmsh's order, lies in the middle of its edge */
 TEST(Field, OrderOfNodes)
 {
   const int gmsh10[][2]  = {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}},
@@ -196,7 +195,7 @@ TEST(Field, OrderOfNodes)
   for (int k = 0; k < 12; k++) EXPECT_TRUE(same(gmsh20[GmshPlace(ElementType::Brick20, 8 + k) - 8], vtk20[k])) << k;
 }
 
-/* ParaView's library reads the file and finds our numbers in it */
+/* ParaView's library reads the file and finds our numbers */
 TEST(Field, ReadByVtk)
 {
   if (!HaveVtk()) GTEST_SKIP() << "python3-vtk9 is not installed";

@@ -1,4 +1,4 @@
-/* Inertia invariants against sums over the entries of M and against the energy of the full model in motion. */
+/* Inertia invariants against sums over the entries of M, and against the kinetic energy of the full model in motion */
 #include "dense.h"
 #include "box_model.h"
 #include "flexible/attachments.h"
@@ -11,7 +11,7 @@ using namespace hhtdae;
 namespace
 {
 
-/* A bent and tapered bar, so that nothing vanishes by symmetry */
+/* A bent and tapered bar, for which no invariant vanishes by symmetry */
 struct Bent {
   FeModel     model;
   ReducedBody body;
@@ -39,7 +39,7 @@ double random(std::mt19937 &engine) { return std::uniform_real_distribution<doub
 
 } // namespace
 
-/* Every integral as the double sum over m_ij that defines it */
+/* Every invariant as the double sum over m_ij that defines it */
 TEST(Invariants, AreSumsOverTheMassMatrix)
 {
   Bent             b;
@@ -97,7 +97,7 @@ TEST(Invariants, ModesAreOrthonormalAndFreeOfMomentum)
   EXPECT_LT(moment, 1e-12);
 }
 
-/* The modes diagonalize K: omega^2 */
+/* The modes diagonalize K with the eigenvalues omega^2 */
 TEST(Invariants, ModesDiagonalizeTheStiffness)
 {
   Bent            b;
@@ -123,7 +123,8 @@ TEST(Invariants, ModesDiagonalizeTheStiffness)
       EXPECT_NEAR(K(k, l), k == l ? omega[k] * omega[k] : 0., 1e-9 * omega[n - 1] * omega[n - 1]);
 }
 
-/* Velocity field V + w x (X + phi eta) + phi eta' at large eta: 1/2 v^T M v of all nodes and by invariants */
+/* Kinetic energy for the velocity field V + w x (X + phi eta) + phi eta' with large eta: 1/2 v^T M v over all nodes
+   against the invariants */
 TEST(Invariants, KineticEnergyOfTheFullModel)
 {
   Bent             b;
@@ -172,14 +173,14 @@ TEST(Invariants, KineticEnergyOfTheFullModel)
                           0.5 * w.dot(J * w) + w.dot(h) + 0.5 * rate.squaredNorm();
     if (trial == 0) MEASURED("energy %.15g by the full model, by invariants off by %.1e", full, energy / full - 1);
     EXPECT_NEAR(energy, full, 1e-11 * full);
-    /* and the parts that depend on the deformation are no small change */
+    /* the parts that depend on the deformation are not negligible */
     EXPECT_GT(std::abs(0.5 * w.dot((Q - m.moments).trace() * w - (Q - m.moments) * w)), 1e-6 * full);
   }
   VecDestroy(&v);
   VecDestroy(&Mv);
 }
 
-/* The motion of a rigid attachment is that of its nodes, the motion of an average the nearest rigid one */
+/* A rigid attachment moves with its nodes; an averaging attachment has the nearest rigid motion of its nodes */
 TEST(Invariants, AttachmentsFollowTheNodes)
 {
   Bent                   b;

@@ -1,4 +1,5 @@
-/* Kept nodes and load cases of reduced bodies, against the finite-element model that they come from: its stiffness, its volume, its dynamics. */
+/* Kept nodes and load cases of reduced bodies against the finite-element model from which they were made: its
+   stiffness, volume and dynamics */
 #include "dense.h"
 #include "fe_mesh.h"
 #include "hhtdae/flexible.h"
@@ -26,7 +27,7 @@ MatrixXd dense(Mat A)
   return D.transpose();
 }
 
-/* All modes of a small unsupported body: nothing of the model is lost */
+/* All modes of a small unsupported body, so that the reduction is exact */
 Reduction everything(PetscInt nodes)
 {
   Reduction r;
@@ -38,7 +39,7 @@ Reduction everything(PetscInt nodes)
 
 Vector3 place(const FeModel &m, PetscInt i) { return Eigen::Map<const Vector3>(&m.coordinates[3 * i]); }
 
-/* 2 x 1 x 1 bricks of soft matter; node i has the label i + 1 */
+/* 2 x 1 x 1 bricks of a soft material; node i has the label i + 1 */
 struct Small {
   FeModel    model{PETSC_COMM_SELF};
   BoxBuilder builder;
@@ -66,7 +67,7 @@ void force(Scene &s, const std::string &name, Marker at, const Vector3 &f, bool 
 
 } // namespace
 
-/* Translations are those of the modes at the nodes; rotations follow rigid motions, and in bending the slope of the axis */
+/* Translations are those of the modes at the nodes; rotations follow rigid motions and, in bending, the slope of the axis */
 TEST(KeptNodes, MotionsOfTheModes)
 {
   Made        m(bar(16, 2, 2));
@@ -89,7 +90,7 @@ TEST(KeptNodes, MotionsOfTheModes)
   const double h = 0.5 / 16;
   int          bending = 0;
   for (PetscInt k = 0; k < body.modal.modes(); k++)
-    for (int c : {1, 2}) { /* slope of y is the rotation about z, of z its opposite about y */
+    for (int c : {1, 2}) { /* the slope of y is the rotation about z; the slope of z is the opposite of the rotation about y */
       double slope = 0, off = 0, most = 0;
       for (std::size_t j = 1; j + 1 < axis.size(); j++) {
         const double central = (axis[j + 1]->translation(c, k) - axis[j - 1]->translation(c, k)) / (2 * h) * (c == 1 ? 1 : -1);
@@ -97,7 +98,7 @@ TEST(KeptNodes, MotionsOfTheModes)
         off   = std::max(off, std::abs(central - axis[j]->rotation(3 - c, k)));
         most  = std::max(most, axis[j]->rotation.col(k).cwiseAbs().maxCoeff());
       }
-      if (slope < 0.5 * most || body.modal.omega[k] > 3 * body.modal.omega[0]) continue; /* slender bending alone has planes that stay plane */
+      if (slope < 0.5 * most || body.modal.omega[k] > 3 * body.modal.omega[0]) continue; /* only in slender bending do plane sections stay plane */
       bending++;
       EXPECT_LT(off, 0.1 * slope) << "mode " << k;
     }
@@ -139,7 +140,8 @@ TEST(KeptNodes, WhatIsAskedForWrongly)
   says("Load case wind: pressure needs elements");
 }
 
-/* Held at the nodes of one end, pushed at another one or turned, in static equilibrium: the model's stiffness says where its nodes go */
+/* Held at the nodes of one end and loaded at another node by a force or moment, in static equilibrium: displacements
+   follow from the stiffness of the model */
 TEST(KeptNodes, StaticsOfTheModel)
 {
   Small       s;
@@ -156,12 +158,13 @@ TEST(KeptNodes, StaticsOfTheModel)
   const ModalNode       &node = model->nodes[free[at]];
   const Vector3          load(0.01, -0.02, 0.03);
   for (bool moment : {false, true}) {
-    /* the work of a moment is that with the node's rotation, a combination of displacements */
+    /* the work of a moment is its product with the node's rotation, which is a combination of displacements */
     VectorXd f = VectorXd::Zero(Kff.rows());
     if (moment) {
-      const MatrixXd rows = node.rotation * (body.shape.transpose() * dense(s.model.M)); /* of displacements without rigid motion */
+      const MatrixXd rows = node.rotation * (body.shape.transpose() * dense(s.model.M)); /* for displacements without rigid motion */
       VectorXd       all  = rows.transpose() * load;
-      /* and of rigid ones: the load is balanced by the supports, so that what it does with them is a moment about any point */
+      /* for rigid motions: the supports balance the load, so that together they form a moment that is the same about
+         any point */
       MatrixXd rigid(3 * s.model.nodes, 6);
       for (PetscInt i = 0; i < s.model.nodes; i++) rigid.middleRows<3>(3 * i) << Matrix3::Identity(), -Cross<double>(place(s.model, i) - model->center);
       const MatrixXd            M     = dense(s.model.M);
@@ -197,14 +200,14 @@ TEST(KeptNodes, StaticsOfTheModel)
     must(TSDestroy(&ts));
     const double off = (Eigen::Map<const VectorXd>(x.data(), u.size()) - u).norm() / u.norm();
     MEASURED("%s: displacement %.3e, relative difference %.2e", moment ? "moment" : "force", u.cwiseAbs().maxCoeff(), off);
-    EXPECT_LT(off, 2e-4); /* geometry is not linear: of the order of u/length */
+    EXPECT_LT(off, 2e-4); /* geometric nonlinearity, of the order of u/length */
   }
 }
 
 namespace
 {
 
-/* Volume of a mesh of any solids from the positions of its nodes */
+/* Volume of a mesh of solids for given positions of its nodes */
 double volume(const FeModel &m, const VectorXd &x)
 {
   double sum = 0;
@@ -227,7 +230,8 @@ double volume(const FeModel &m, const VectorXd &x)
 
 } // namespace
 
-/* Pressure all around does the work - dV: its work with the modes and the derivatives of that are those of the volume; it moves nothing as a whole */
+/* Uniform pressure on the whole surface does the work - dV: its modal work and the derivatives of it are those of the
+   volume, and its resultant vanishes */
 TEST(KeptNodes, PressureAllAroundIsTheVolume)
 {
   for (ElementType type : {ElementType::Tetrahedron4, ElementType::Tetrahedron10, ElementType::Brick8, ElementType::Brick20}) {
@@ -266,11 +270,12 @@ TEST(KeptNodes, PressureAllAroundIsTheVolume)
     EXPECT_LT((p.modal - fixed.modal).norm(), 1e-13 * p.modal.norm());
     EXPECT_EQ(fixed.modal_gradient.size() + fixed.force_gradient.size(), 0);
     EXPECT_GT(fixed.moment_gradient.norm(), 0.1 * phi);
-    EXPECT_NEAR(left.force(0), 1, 0.5); /* inwards on the end x = 0, whose area is about one */
+    EXPECT_NEAR(left.force(0), 1, 0.5); /* points inwards on the end x = 0, whose area is about one */
   }
 }
 
-/* Gradients of force and moment: those of the pressure on the displaced surface, itself integrated over bilinear patches */
+/* Derivatives of resultant force and moment with respect to the modal coordinates are those of the pressure on the
+   displaced surface, which the test integrates over bilinear patches */
 TEST(KeptNodes, PressureFollowsTheSurface)
 {
   Small       s;
@@ -280,7 +285,7 @@ TEST(KeptNodes, PressureFollowsTheSurface)
   must(Reduce(s.model, r, &body));
   const ModalLoadCase &p = body.modal.loads[0];
   const VectorXd       X = Eigen::Map<const VectorXd>(s.model.coordinates.data(), 3 * s.model.nodes);
-  const auto           load = [&](const VectorXd &x) { /* force and moment on the top faces, nodes 4 to 7 of each brick, outward normal up */
+  const auto           load = [&](const VectorXd &x) { /* force and moment on the top faces (nodes 4 to 7 of each brick, outward normal up) */
     Eigen::Matrix<double, 6, 1> f = Eigen::Matrix<double, 6, 1>::Zero();
     for (const FeElement &e : s.model.elements) {
       const Vector3 a = x.segment<3>(3 * e.node[4]), b = x.segment<3>(3 * e.node[5]), c = x.segment<3>(3 * e.node[6]), d = x.segment<3>(3 * e.node[7]);
@@ -303,11 +308,12 @@ TEST(KeptNodes, PressureFollowsTheSurface)
   for (PetscInt k = 0; k < body.modal.modes(); k++) {
     const Eigen::Matrix<double, 6, 1> by = (load(X + h * body.shape.col(k)) - load(X - h * body.shape.col(k))) / (2 * h);
     EXPECT_LT((by.head<3>() - p.force_gradient.col(k)).norm(), 1e-6 * (1e-2 + by.norm()));
-    EXPECT_LT((by.tail<3>() - p.moment_gradient.col(k)).norm(), 2e-3 * (1e-2 + by.norm())); /* midpoints */
+    EXPECT_LT((by.tail<3>() - p.moment_gradient.col(k)).norm(), 2e-3 * (1e-2 + by.norm())); /* integrated by the midpoint rule */
   }
 }
 
-/* A pulse of pressure on a free body: the modal coordinates and the fall are those of the model's own equations, integrated mode by mode of K x = l M x */
+/* A pressure pulse on a free body: modal coordinates and rigid motion are those of the model's equations, integrated
+   mode by mode of K x = l M x */
 TEST(KeptNodes, DynamicsUnderPressure)
 {
   Small       s;
@@ -327,7 +333,7 @@ TEST(KeptNodes, DynamicsUnderPressure)
   Array    x;
   must(run.solve());
   must(scene.sample(run.ts, t, x));
-  /* consistent forces of one unit of pressure: thirds of the trapezoids would do, the exact ones come from the volume under the surface's nodes */
+  /* consistent nodal forces of a unit pressure, by 2 x 2 Gauss points on each top face */
   VectorXd       f(3 * s.model.nodes);
   const VectorXd X = Eigen::Map<const VectorXd>(s.model.coordinates.data(), 3 * s.model.nodes);
   f.setZero();
@@ -355,7 +361,8 @@ TEST(KeptNodes, DynamicsUnderPressure)
   EXPECT_LT(off, 1e-3);
 }
 
-/* A block on springs that its bottom nodes press: the model's stiffness and the contact's, and the weight of each node */
+/* A block on springs whose bottom nodes are pressed on a plane: the deflection follows from the stiffness of the model
+   and of the contact, and from the weight at each node */
 TEST(KeptNodes, ABlockOnThePlane)
 {
   Small       s;
@@ -376,7 +383,7 @@ TEST(KeptNodes, ABlockOnThePlane)
   scene.gravity({0, 0, -g});
   for (PetscInt i = 0; i < s.model.nodes; i++) scene.channel(text("z%d", (int)i), Measure::displacement(scene.marker(scene.node(flex, i + 1)), 2));
   scene.channel("force", Measure::force(touch, 2));
-  /* no tangential force at rest: two weak springs take the three motions in the plane */
+  /* at rest there is no tangential force: two weak springs prevent the three motions in the plane */
   const Marker c = scene.marker(scene.node(flex, 1)), e = scene.marker(scene.node(flex, 12));
   for (int n = 0; n < 2; n++) {
     const Vector3 at = place(s.model, n ? 11 : 0);
@@ -414,7 +421,8 @@ TEST(KeptNodes, ABlockOnThePlane)
   EXPECT_NEAR(x[s.model.nodes], body.modal.mass * g, 1e-4 * body.modal.mass * g);
 }
 
-/* Held at one end, shaken by equal forces on the nodes of the other: the whole finite-element body beside the one in modes, a load case of which is these forces */
+/* Held at one end and shaken by equal forces on the nodes of the other end: the whole finite-element body and the
+   modal body with these forces as a load case have the same motion */
 TEST(KeptNodes, DynamicsOfTheWholeBody)
 {
   const double t = 0.15;

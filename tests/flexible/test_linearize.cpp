@@ -1,4 +1,4 @@
-/* Small motions against closed forms: modes, shapes, response, minimal coordinates. */
+/* Small motions against closed forms: modes, mode shapes, frequency response, minimal coordinates */
 #include "hhtdae/helpers.h"
 #include "hhtdae/linearize.h"
 #include "hhtdae/modes.h"
@@ -12,7 +12,7 @@ using Complex = std::complex<double>;
 namespace
 {
 
-/* The start of a scene */
+/* The linearization of a scene at its start */
 struct Started {
   SceneRun      run;
   Linearization small;
@@ -25,7 +25,7 @@ struct Started {
   }
 };
 
-/* Imaginary parts that are not zero, in order */
+/* Nonzero imaginary parts in ascending order */
 std::vector<double> frequencies(const std::vector<Mode> &modes, double zero = 1e-6)
 {
   std::vector<double> w;
@@ -46,7 +46,7 @@ RigidBody body(double mass, const Vector3 &inertia, const Vector3 &position = Ve
 
 constexpr double m = 2, c = 3, k = 500;
 
-/* A mass on a slider along x, with a spring and a damper, turned about an oblique axis so that no coordinate is along x */
+/* A mass on a slider along an oblique axis, with a spring and a damper; no space coordinate is along the slider */
 struct Slider {
   Scene       scene{PETSC_COMM_SELF};
   Marker      at, ground;
@@ -79,7 +79,7 @@ TEST(Linearize, DampedOscillator)
   EXPECT_NEAR(modes[0].frequency(), std::sqrt(k / m) / (2 * M_PI), 1e-9);
 }
 
-/* Displacement, acceleration, and the spring's force, which the load does not reach directly */
+/* Response of displacement, acceleration and spring force; the load does not act on the spring directly */
 TEST(Linearize, ResponseOfAnOscillator)
 {
   Slider                     s;
@@ -105,7 +105,8 @@ TEST(Linearize, ResponseOfAnOscillator)
   }
 }
 
-/* A state p of the size of pressures follows the slider, p' = 2 (x - 2): differences of it are not rounding of p0 */
+/* A state p with values of the size of pressures depends on the slider, p' = 2 (x - 2): its derivatives by differences
+   must not be lost in the rounding of p0 */
 TEST(Linearize, MeasuresFarFromZero)
 {
   for (double p0 : {0., 1e5, 1e7, 2e8, 1e9}) {
@@ -127,8 +128,8 @@ TEST(Linearize, MeasuresFarFromZero)
   }
 }
 
-/* A force that is steep in the integral of a displacement: where nearly all of this is in phase, the part of the integral that is not is not differentiated at an
-   endless reach */
+/* A force that is a steep function of the integral of a displacement. If almost the whole integral is in phase, the
+   small out-of-phase part must not be differentiated with a very large increment */
 TEST(Linearize, BothPartsOfASteepFunction)
 {
   for (double damping : {0., 1e-12, 1e-3}) {
@@ -145,7 +146,7 @@ TEST(Linearize, BothPartsOfASteepFunction)
   }
 }
 
-/* Two rods that hang from one another: M and K of the angles */
+/* Two rods, one suspended from the other: M and K in terms of the angles */
 TEST(Linearize, DoublePendulum)
 {
   for (Space kind : {Space::Planar, Space::Spatial}) {
@@ -182,8 +183,9 @@ TEST(Linearize, DoublePendulum)
   }
 }
 
-/* Two runs that differ a little, at any moment of any motion: their difference in space axes solves M x'' + C x' + K x = 0, as no force is between them
-   but what the expansion has. Rotations: x' = dw + w x x, x'' = da + a x x + w x x'. */
+/* Two runs with slightly different initial values, at any time of any motion: their difference in space axes satisfies
+   M x'' + C x' + K x = 0, because no external force acts that is not in the linearization. Rotations: x' = dw + w x x,
+   x'' = da + a x x + w x x' */
 TEST(Linearize, DifferenceOfTwoTumblingRuns)
 {
   constexpr double apart = 1e-6, end = 0.3, inside = end - 1e-5;
@@ -202,7 +204,7 @@ TEST(Linearize, DifferenceOfTwoTumblingRuns)
       SceneRun ts(scene, end, tolerance(1e-7));
       Snapshot now;
       must(ts.solve());
-      must(now.take(ts.ts, inside)); /* not at its end, so that accelerations are solved for */
+      must(now.take(ts.ts, inside)); /* not at the end of the step, so that accelerations are solved for */
       must(now.motion(one, &motion[run]));
       if (run) continue;
       must(small.take(ts.ts, inside));
@@ -241,8 +243,9 @@ TEST(Linearize, DifferenceOfTwoTumblingRuns)
   }
 }
 
-/* Coordinates of a single freedom are lengths along its path in units of masses, s'' = -dV/ds - c s', whatever the speed: a rod at a height, a swing and a
-   spin where no state is steady */
+/* With a single degree of freedom the minimal coordinate is the arc length in the metric of the masses, s'' = -dV/ds -
+   c s', at any speed: a rod at rest in a raised position, a swinging and a rotating one, although no such state is
+   steady */
 TEST(Linearize, APendulumThatSwings)
 {
   constexpr double mass = 2, half = 0.7, J = 0.4 + mass * half * half, g = 9.81, damping = 0.8;
@@ -269,11 +272,11 @@ TEST(Linearize, APendulumThatSwings)
       }
 }
 
-/* The same of a slider-crank by what its energies are of the crank's angle */
+/* The same for a slider-crank, whose energies are known functions of the crank's angle */
 TEST(Linearize, ASliderCrankAtSpeed)
 {
   constexpr double r = 0.3, l = 0.8, m1 = 1, m2 = 2, m3 = 1.5, J1 = 0.02, J2 = 0.15, stiffness = 300, g = 9.81;
-  const auto       at = [&](double a, double *inertia) { /* potential energy, and kinetic energy at a speed of 1 */
+  const auto       at = [&](double a, double *inertia) { /* potential energy, and kinetic energy for unit angular velocity */
     const double b = std::asin(r * std::sin(a) / l), db = r * std::cos(a) / (l * std::cos(b)), x = r * std::cos(a) + l * std::cos(b);
     const double dx = -r * std::sin(a) - l * std::sin(b) * db, dx2 = -r * std::sin(a) - l / 2 * std::sin(b) * db, dy2 = l / 2 * std::cos(b) * db;
     *inertia = m1 * r * r / 4 + J1 + m2 * (dx2 * dx2 + dy2 * dy2) + J2 * db * db + m3 * dx * dx;
@@ -384,7 +387,7 @@ TEST(Linearize, AHingedBladeOnADrivenHub)
 namespace
 {
 
-/* Measures of a run at a time, and of its linearization */
+/* Values of measures of a run at a time, and its linearization */
 struct Constrained {
   std::vector<Measure> state, second;
   void                 add(Marker at)
@@ -397,7 +400,7 @@ struct Constrained {
   }
 };
 
-/* Two rods in space, from a ball joint and a hinge between them, or a disc that rolls; k: which of the initial values is different by `apart` */
+/* Two rods in space on a ball joint, with a hinge between them, or a rolling disc; k: which initial value differs by `apart` */
 Constrained constrained(Scene &scene, bool rolls, int k, double apart)
 {
   const auto  by = [&](int i) { return i == k ? apart : 0.; };
@@ -436,8 +439,8 @@ Constrained constrained(Scene &scene, bool rolls, int k, double apart)
 
 } // namespace
 
-/* What the reduction makes of constraints that change along the motion: from differences of positions and velocities between two runs follow those of
-   accelerations */
+/* Reduction with constraints that change along the motion: the accelerations of the difference of two runs follow from
+   the differences of positions and velocities */
 TEST(Linearize, DifferenceOfTwoConstrainedRuns)
 {
   constexpr double apart = 1e-4;
@@ -486,7 +489,7 @@ TEST(Linearize, SteepForces)
   }
 }
 
-/* An angle of half a turn, which is pi on one side and -pi on the other */
+/* An angle at half a turn, where it jumps from pi to -pi */
 TEST(Linearize, AngleOfHalfATurn)
 {
   Scene scene(PETSC_COMM_SELF, Space::Planar);
@@ -500,7 +503,8 @@ TEST(Linearize, AngleOfHalfATurn)
   EXPECT_LT(std::abs(angle - 1.), 1e-8);
 }
 
-/* A top that sleeps: I s^2 - i I_a spin s - m g l = 0 for the inclination; coordinates and the joint's axes turn with it */
+/* A sleeping top: I s^2 - i I_a spin s - m g l = 0 for the inclination; coordinates and axes of the joint rotate with
+   the top */
 TEST(Linearize, SleepingTop)
 {
   const double mass = 3, l = 0.4, It = 0.3 + mass * l * l, Ia = 0.5, g = 9.81;
@@ -522,7 +526,8 @@ TEST(Linearize, SleepingTop)
     }
 }
 
-/* A rotor in a bearing on springs: its frequencies split with speed. The axes of the joint turn with the rotor or stand with the bearing. */
+/* A rotor in a bearing on springs: its frequencies split with the speed. The axes of the joint rotate with the rotor
+   or are fixed to the bearing */
 TEST(Linearize, WhirlOfARotor)
 {
   const double It = 0.3, Ia = 0.5, Ib = 0.1, stiffness = 200;
@@ -545,7 +550,8 @@ TEST(Linearize, WhirlOfARotor)
     }
 }
 
-/* The same rotor as seen from itself: backward whirl is faster by the speed, forward whirl slower; what is along or about the axis is as it was */
+/* The same rotor in axes that rotate with it: the frequency of backward whirl is larger by the speed, that of forward
+   whirl smaller; motions along or about the axis are unchanged */
 TEST(Linearize, WhirlInTheAxesOfTheRotor)
 {
   const double It = 0.3, Ia = 0.5, Ib = 0.1, stiffness = 200, spin = 7;
@@ -569,8 +575,9 @@ TEST(Linearize, WhirlInTheAxesOfTheRotor)
   for (std::size_t n = 0; n < w.size(); n++) EXPECT_NEAR(w[n], expected[n], 1e-6 * expected[n]);
 }
 
-/* A rod on a ball joint at a distance e from the axis of a hub that a motion drives: across the plane of rotation W sqrt(1 + 3 e/2 L), in it
-   W sqrt(3 e/2 L). In space axes nothing stands still. */
+/* A rod on a ball joint at the distance e from the axis of a hub that a motion drives with the speed W: the frequency
+   across the plane of rotation is W sqrt(1 + 3 e/2 L), in the plane W sqrt(3 e/2 L). In space axes the state is not
+   steady */
 TEST(Linearize, ARigidBladeOnADrivenHub)
 {
   const double speed = 12, L = 2, e = 0.3, mass = 1.5;
@@ -593,20 +600,21 @@ TEST(Linearize, ARigidBladeOnADrivenHub)
     must(small.take(run.ts, hub));
     must(small.modes(&modes));
     const auto w = frequencies(modes, 1e-2 * speed);
-    ASSERT_EQ(w.size(), 2u); /* a thin rod turns freely about its own axis */
+    ASSERT_EQ(w.size(), 2u); /* a thin rod rotates freely about its own axis */
     EXPECT_NEAR(w[0], speed * std::sqrt(1.5 * e / L), 1e-4 * speed);
-    EXPECT_NEAR(w[1], speed * std::sqrt(1 + 1.5 * e / L), 1e-4 * speed); /* it is a little thick */
+    EXPECT_NEAR(w[1], speed * std::sqrt(1 + 1.5 * e / L), 1e-4 * speed); /* its thickness is not zero */
   }
 }
 
-/* A disc that rolls straight on: I (I + m r^2) s^2 = I m g r - I_a (I_a + m r^2) rate^2 for its inclination, unstable below a speed */
+/* A disc that rolls straight: I (I + m r^2) s^2 = I m g r - I_a (I_a + m r^2) rate^2 for its inclination, unstable
+   below a critical speed */
 TEST(Linearize, RollingDisc)
 {
   const double mass = 1.5, r = 0.3, g = 9.81, It = mass * r * r / 4, Ia = mass * r * r / 2;
   for (double rate : {2., 5., 12.}) {
     Scene     scene(PETSC_COMM_SELF);
     RigidBody b        = body(mass, {It, It, Ia}, {0, 0, r});
-    b.rotation         = Eigen::AngleAxisd(-M_PI / 2, Vector3::UnitX()).toRotationMatrix(); /* its axis along y */
+    b.rotation         = Eigen::AngleAxisd(-M_PI / 2, Vector3::UnitX()).toRotationMatrix(); /* axis along y */
     b.angular_velocity = {0, rate, 0};
     b.velocity         = {rate * r, 0, 0};
     scene.gravity({0, 0, -g});
@@ -620,7 +628,7 @@ TEST(Linearize, RollingDisc)
   }
 }
 
-/* A mass driven by a controller with a lag and a variable: m s^2 + c s + k + gain/(1 + tau s) = 0 */
+/* A mass with a controller that contains a lag and a variable: m s^2 + c s + k + gain/(1 + tau s) = 0 */
 TEST(Linearize, StatesAndVariables)
 {
   const double gain = 300, tau = 0.05;
@@ -630,7 +638,7 @@ TEST(Linearize, StatesAndVariables)
   s.scene.add("drive", UserScalarForce{s.at, s.ground, Expression{{Measure::value(filtered)}, [](const Real *x) { return -x[0]; }}});
   const Started start(s.scene);
   const auto    modes = start.modes();
-  ASSERT_EQ(modes.size(), 2u); /* a pair, and a real one */
+  ASSERT_EQ(modes.size(), 2u); /* a complex pair and a real one */
   for (const Mode &mode : modes) {
     const Complex v = mode.value;
     EXPECT_LT(std::abs((m * v * v + c * v + k) * (1. + tau * v) + gain), 1e-6 * (k + gain)) << v;
@@ -641,7 +649,7 @@ TEST(Linearize, StatesAndVariables)
   EXPECT_LT(std::abs(y - gain * x), 1e-6 * gain);
 }
 
-/* The slowest ones of a chain by sparse and by dense algebra, and no trace of it all in the run */
+/* The slowest modes of a chain, by sparse and by dense algebra; the analysis does not change the run */
 TEST(Linearize, SlowestModesOfAChain)
 {
   Rods              rods(12);
@@ -658,7 +666,8 @@ TEST(Linearize, SlowestModesOfAChain)
   }
 }
 
-/* What has no inertia, or next to none beside its damping: a lag, and a mass that creeps back */
+/* Motions without inertia, or with negligible inertia compared with their damping: a first-order lag, and a mass that
+   creeps back to equilibrium */
 TEST(Linearize, SlowestModesWithoutInertia)
 {
   const double tau = 20, damping = 1e6;
@@ -678,7 +687,7 @@ TEST(Linearize, SlowestModesWithoutInertia)
   }
 }
 
-/* Before the first step and after it, and of the same run later */
+/* Linearization before the first step, after it, and later in the same run */
 TEST(Linearize, StartOfARun)
 {
   Rods              rods(3);
@@ -745,7 +754,7 @@ TEST(Linearize, ErrorsThatSayWhatToDo)
   EXPECT_TRUE(trap.says("must be positive")) << trap.message;
 }
 
-/* Inputs that a body cannot follow */
+/* Inputs to which a body cannot respond */
 TEST(Linearize, LoadsThatMoveNothing)
 {
   StateSpace space;
@@ -760,7 +769,8 @@ TEST(Linearize, LoadsThatMoveNothing)
   }
 }
 
-/* All masses are taken along by the ground: a mass on a spring, and a rod that hangs, J s^2 + m g l = -m l a for its angle */
+/* The acceleration of the ground acts on all masses: a mass on a spring, and a suspended rod with J s^2 + m g l = -m l
+   a for its angle */
 TEST(Linearize, AShakenGround)
 {
   const std::vector<double> w = {0, 3, 12, 40};
@@ -791,8 +801,8 @@ TEST(Linearize, AShakenGround)
   }
 }
 
-/* A table that is shaken along x, with a mass on spring and damper: x/y = (k + i w c)/(k - m w^2 + i w c), by motions of displacement, velocity and
-   acceleration; the force of the drive is what the masses need */
+/* A table shaken along x with a mass on a spring and damper: x/y = (k + i w c)/(k - m w^2 + i w c), with the motion
+   given as displacement, velocity or acceleration; the force of the drive accelerates both masses */
 TEST(Linearize, AShakenBase)
 {
   const double               m = 2, k = 300, c = 5, table_mass = 3;
@@ -822,7 +832,7 @@ TEST(Linearize, AShakenBase)
     StateSpace z;
     if (of == MotionOf::Acceleration) {
       must(small.stateSpace({Excitation::motion(drive)}, {Measure::displacement(top, 0)}, &z));
-      ASSERT_EQ(z.states, 4); /* positions of both, speeds of the mass and, as a state, of the table */
+      ASSERT_EQ(z.states, 4); /* positions of both, the velocity of the mass, and the velocity of the table as a state */
       using Dense = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
       const Dense A = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(z.A.data(), 4, 4).cast<std::complex<double>>();
       const Dense B = Eigen::Map<Eigen::MatrixXd>(z.B.data(), 4, 1).cast<std::complex<double>>(), C = Eigen::Map<Eigen::MatrixXd>(z.C.data(), 1, 4).cast<std::complex<double>>();
@@ -840,7 +850,7 @@ TEST(Linearize, AShakenBase)
 namespace
 {
 
-/* What a linearization says, as numbers */
+/* Results of a linearization as a list of numbers */
 std::vector<double> said(const Linearization &small, const Excitation &in, const std::vector<Measure> &out, Body body)
 {
   std::vector<double> all;
@@ -870,7 +880,8 @@ std::vector<double> said(const Linearization &small, const Excitation &in, const
 
 } // namespace
 
-/* A pendulum with a spring that counts turns, which swings on after it has been linearized */
+/* A linearization belongs to the state at which it was made: a pendulum with a spring that counts turns swings on, and
+   the results stay the same */
 TEST(Linearize, GoesOnBeingOfItsState)
 {
   for (const char *rotations : {"local", "euler313"}) {
@@ -900,7 +911,7 @@ TEST(Linearize, GoesOnBeingOfItsState)
     const std::vector<double> now = said(small, in, out, rod);
     ASSERT_EQ(now.size(), then.size());
     for (std::size_t k = 0; k < now.size(); k++) EXPECT_EQ(now[k], then[k]) << rotations << " " << k;
-    Snapshot after; /* and the run has kept its own */
+    Snapshot after; /* the run has kept its own count of turns */
     double   turns;
     must(after.take(run.ts));
     must(after.value(Measure::force(spring, 0), &turns));
@@ -908,7 +919,8 @@ TEST(Linearize, GoesOnBeingOfItsState)
   }
 }
 
-/* m z'' = -k z - c z' - a z'' - m g'': measures of accelerations are relative to the ground, of variables and of forces that read them as well */
+/* m z'' = -k z - c z' - a z'' - m g'': measures of acceleration are relative to the ground, also inside variables and
+   forces that contain them */
 TEST(Linearize, GroundAccelerationAndMeasuresOfAcceleration)
 {
   for (double feedback : {0., 3.}) {
@@ -940,7 +952,8 @@ TEST(Linearize, GroundAccelerationAndMeasuresOfAcceleration)
   }
 }
 
-/* z' = V, V = -2 z + (y - 1)/2, y'' = -5 (y - z) - 0.3 (y' - z') + f: variables of rows of velocities, as if their definitions were written there */
+/* z' = V, V = -2 z + (y - 1)/2, y'' = -5 (y - z) - 0.3 (y' - z') + f: a variable in a velocity-level constraint acts
+   as if its definition were written there */
 TEST(Linearize, VariablesInRowsOfVelocities)
 {
   std::vector<Complex> values[2];
@@ -981,7 +994,8 @@ TEST(Linearize, VariablesInRowsOfVelocities)
   for (std::size_t k = 0; k < values[0].size(); k++) EXPECT_LT(std::abs(values[0][k] - values[1][k]), 1e-8);
 }
 
-/* A bead on a line that turns with w about the place where the bead rests, k = 5 w^2: 2i times w, whatever the unit of time */
+/* A bead on a line that rotates with w about the bead's rest position, with springs k = 5 w^2: the eigenvalue is 2i w
+   in any unit of time */
 TEST(Linearize, RowsThatTurnByThemselves)
 {
   for (double w : {1e-5, 0.1, 1., 50., 2 * M_PI / 0.01, 2 * M_PI / 0.00125, 1e3, 1e6}) {
@@ -1004,7 +1018,8 @@ TEST(Linearize, RowsThatTurnByThemselves)
   }
 }
 
-/* Each of force, moment and ground: what has no effect is not dropped beside what has one */
+/* Force, moment and acceleration of the ground: an input without effect is refused, also together with one that has an
+   effect */
 TEST(Linearize, ExcitationsWithoutEffect)
 {
   Scene        s(PETSC_COMM_SELF, Space::Planar);

@@ -1,11 +1,11 @@
-/* The file of a reduced body: what was written is read, and whatever is wrong with a file is refused with a reason. */
+/* The file of a reduced body: what was written is read back, and a faulty file is refused with a reason */
 #include "hhtdae/flexible.h"
 #include "reduced_body.h"
 #include <limits>
 
 using namespace hhtest;
 
-/* petscviewerhdf5.h wants HDF5's headers, which a test need not have */
+/* declared here, because petscviewerhdf5.h includes HDF5's headers, which may not be installed for tests */
 PETSC_EXTERN PetscErrorCode PetscViewerHDF5Open(MPI_Comm, const char[], PetscFileMode, PetscViewer *);
 PETSC_EXTERN PetscErrorCode PetscViewerHDF5WriteAttribute(PetscViewer, const char[], const char[], PetscDataType,
                                                           const void *);
@@ -15,7 +15,7 @@ PETSC_EXTERN PetscErrorCode PetscViewerHDF5ReadAttribute(PetscViewer, const char
 namespace
 {
 
-/* The message with which a file is refused */
+/* The error message with which a file is refused */
 std::string Refused(const std::string &file)
 {
   ReducedBody body;
@@ -57,7 +57,7 @@ TEST(ReducedFile, Roundtrip)
   EXPECT_FALSE(std::ifstream(file.name + ".part").good());
 }
 
-/* All of the stiffening or none, symmetric */
+/* Stiffening matrices are complete and symmetric, or all absent */
 TEST(ReducedFile, Stiffening)
 {
   Scratch     file("stiffening.h5");
@@ -102,7 +102,7 @@ TEST(ReducedFile, WithoutNodesOrModes)
   }
 }
 
-/* The same body makes the same bytes: no times, no order of hash tables */
+/* The same body gives the same bytes: the file contains no time stamps and does not depend on the order of hash tables */
 TEST(ReducedFile, SameBytes)
 {
   HandMade made(PETSC_COMM_SELF);
@@ -113,7 +113,7 @@ TEST(ReducedFile, SameBytes)
   EXPECT_EQ(one.text(), two.text());
 }
 
-/* A byte of the file that is changed is found, or it is one that no number depends on. */
+/* Any changed byte of the file is detected, unless no number depends on it */
 TEST(ReducedFile, EveryByteCounts)
 {
   HandMade made(PETSC_COMM_SELF, 2, 2);
@@ -151,7 +151,7 @@ TEST(ReducedFile, FlippedByteNamesTheDataset)
   text[at] = (char)(text[at] ^ 1);
   file.write(text);
   EXPECT_SAYS(Refused(file.name), "/nodes/shape is damaged: its checksum does not agree");
-  ModalBody modal; /* what a scene takes is whole */
+  ModalBody modal; /* a scene accepts only complete bodies */
   must(LoadModalBody(PETSC_COMM_SELF, file.name, &modal));
   EXPECT_TRUE(Same(made.body.modal, modal));
 }
@@ -170,7 +170,7 @@ TEST(ReducedFile, Truncated)
   EXPECT_SAYS(Refused(cut.name), "truncated");
 }
 
-/* Files that only HDF5 itself can make, through PETSc: another one, and one of a later version */
+/* Files of another format, and of a later version, made by HDF5 through PETSc */
 TEST(ReducedFile, OtherFormatAndNewerVersion)
 {
   HandMade    made(PETSC_COMM_SELF);
@@ -188,7 +188,7 @@ TEST(ReducedFile, OtherFormatAndNewerVersion)
   EXPECT_SAYS(Refused(newer.name), "it has version 5 of the format, this program knows version 4");
 }
 
-/* A number's share in the checksum, as src/flexible/file.h tells */
+/* Contribution of a number to the checksum, as described in src/flexible/file.h */
 uint64_t VersionShare(uint64_t version)
 {
   const auto mix = [](uint64_t x) {
@@ -201,8 +201,8 @@ uint64_t VersionShare(uint64_t version)
   return mix(version ^ mix(key));
 }
 
-/* Turns a file into one of an older version, whose parts have the same layout. PETSc knows signed numbers only: false if the checksum
- * is none */
+/* Turns a file into one of an older version with the same layout. PETSc has signed integers only: false if the new
+   checksum cannot be represented */
 bool MakeOlder(const std::string &file, int version)
 {
   PetscViewer viewer;
@@ -219,7 +219,7 @@ bool MakeOlder(const std::string &file, int version)
   return fits;
 }
 
-/* Version 1 had residuals in another norm: they are not known, all else is read */
+/* Version 1 had residuals in another norm: they are read as unknown, everything else as before */
 TEST(ReducedFile, VersionOne)
 {
   HandMade made(PETSC_COMM_SELF);
@@ -239,7 +239,7 @@ TEST(ReducedFile, VersionOne)
     EXPECT_EQ(body.mode[k].residual, -1);
   }
   EXPECT_EQ(body.modal.omega, made.body.modal.omega);
-  must(body.save(again.name)); /* what is not known stays so in a new file */
+  must(body.save(again.name)); /* unknown residuals stay unknown in a new file */
   ReducedBody read;
   must(read.load(PETSC_COMM_SELF, again.name));
   EXPECT_EQ(read.mode[0].residual, -1);
@@ -331,7 +331,7 @@ TEST(ReducedFile, NothingToWriteThatCannotBeRead)
   EXPECT_SAYS(trap.message, "cannot write the reduced body to /nowhere/body.h5");
 }
 
-/* A part of the file's name that cannot be replaced: the error comes after the writing */
+/* The target name is a folder, which cannot be replaced: the error occurs after writing */
 TEST(ReducedFile, NameIsAFolder)
 {
   HandMade  m(PETSC_COMM_SELF);

@@ -1,4 +1,4 @@
-/* Reduction of small models: what has to work in every corner. One rank. */
+/* Reduction of small models, including special cases; on one rank */
 #include "box_model.h"
 #include "flexible/diagnose.h"
 #include "reduction_cases.h"
@@ -91,13 +91,13 @@ TEST(Reduction, NumbersOfModes)
   must(Reduce(m.model, free, &body));
   EXPECT_EQ(body.modal.modes(), 4);
   Reduction none;
-  none.modes = 5; /* nothing is held: modes of the free body */
+  none.modes = 5; /* without attachments: modes of the free body */
   must(Reduce(m.model, none, &body));
   EXPECT_EQ(body.modal.modes(), 5);
   EXPECT_EQ(body.method, "free-free");
 }
 
-/* More modes than there are: all of them, and the frequencies are those of the full model */
+/* If more modes are requested than exist, all are returned, with the frequencies of the full model */
 TEST(Reduction, AllModesOfASmallModel)
 {
   Made        m(bar(3, 1, 1));
@@ -125,7 +125,7 @@ TEST(Reduction, Selection)
   EXPECT_EQ(some.modal.modes(), 5);
   EXPECT_NEAR(some.elastic_scale, std::pow(some.modal.omega[4], 2), 1e-9 * some.elastic_scale);
   r.keep_below = 1e-3;
-  must(Reduce(m.model, r, &some)); /* none is left: a rigid body */
+  must(Reduce(m.model, r, &some)); /* no mode left: a rigid body */
   EXPECT_EQ(some.modal.modes(), 0);
 }
 
@@ -142,7 +142,7 @@ TEST(Reduction, NodesAreLeftOut)
   EXPECT_EQ(body.fe_nodes, m.model.nodes);
 }
 
-/* All below a frequency: by an inertia count, and by slices of the spectrum, as by number */
+/* All modes below a frequency, by an inertia count or by slices of the spectrum, equal those requested by number */
 TEST(Reduction, AllBelowAFrequency)
 {
   for (Tie tie : {Tie::Rigid, Tie::Average}) {
@@ -167,7 +167,7 @@ TEST(Reduction, AllBelowAFrequency)
     ASSERT_EQ(sliced.modal.modes(), n + 6);
     EXPECT_LT((number.modal.omega - counted.modal.omega).cwiseQuotient(number.modal.omega).cwiseAbs().maxCoeff(), 1e-9);
     EXPECT_LT((number.modal.omega - sliced.modal.omega).cwiseQuotient(number.modal.omega).cwiseAbs().maxCoeff(), 1e-9);
-    /* one mode more is above the bound */
+    /* one more mode lies above the bound */
     r.modes = n + 1;
     must(Reduce(m.model, r, &number));
     EXPECT_EQ(number.modal.modes(), n + 6);
@@ -190,7 +190,7 @@ TEST(Reduction, FreeModesBelowAFrequency)
   EXPECT_LT(body.mode.back().frequency, 20e3);
 }
 
-/* Copies of eigenvalues: eight pieces of bar between rigid attachments are alike */
+/* Multiple eigenvalues are found completely: eight identical pieces of bar between rigid attachments */
 TEST(Reduction, CopiesOfEigenvaluesAreFound)
 {
   Box       box = {{16, 1, 1}, {1.6, 0.1, 0.1}};
@@ -201,7 +201,7 @@ TEST(Reduction, CopiesOfEigenvaluesAreFound)
     m.builder.addSet(name, [a](const Vector3 &x) { return std::abs(x[0] - 0.2 * a) < 0.01; });
     r.attachments.push_back(attach(name));
   }
-  r.modes = 8 * 12; /* one section of four nodes is free in each piece */
+  r.modes = 8 * 12; /* each piece has one section of four free nodes */
   ReducedBody body;
   must(Reduce(m.model, r, &body));
   EXPECT_EQ(body.modal.modes(), 9 * 6 + 96 - 6);
@@ -224,7 +224,7 @@ TEST(Reduction, FactorsOnce)
     }
     EXPECT_EQ(factorizations() - before, 1);
     must(Reduce(m.model, both(4, tie), &body));
-    EXPECT_EQ(factorizations() - before, 3); /* and one for the count of modes */
+    EXPECT_EQ(factorizations() - before, 3); /* plus one for counting modes */
   }
 }
 
@@ -241,7 +241,7 @@ TEST(Reduction, SolversByOptions)
       must(Reduce(m.model, both(6, tie), &other));
       EXPECT_LT((usual.modal.omega - other.modal.omega).cwiseQuotient(usual.modal.omega).cwiseAbs().maxCoeff(), 1e-7)
           << text;
-      if (tie == Tie::Average) break; /* minres without a preconditioner does not get through a saddle point */
+      if (tie == Tie::Average) break; /* minres without a preconditioner does not converge for a saddle point problem */
     }
   }
 }
@@ -262,7 +262,7 @@ TEST(Reduction, ProgressOfThePhases)
   EXPECT_FALSE(printed.says("units"));
 }
 
-/* A motion of the point away from the nodes is that of the nearest rigid motion, for both ties */
+/* If an attachment point is away from its nodes, its motion is that of the nearest rigid motion of the nodes, for both ties */
 TEST(Reduction, AttachmentAwayFromItsNodes)
 {
   for (Tie tie : {Tie::Rigid, Tie::Average}) {
@@ -281,7 +281,8 @@ TEST(Reduction, AttachmentAwayFromItsNodes)
   }
 }
 
-/* An average stiffens nothing: what loads on one attachment make of a free body's modes is the same beside another one, which shares its nodes */
+/* An averaging attachment adds no stiffness: the geometric stiffening by loads on one attachment of a free body does
+   not change if a second averaging attachment shares its nodes */
 TEST(Reduction, StiffeningOfAveragesThatShareNodes)
 {
   Made        m(bar());
@@ -306,7 +307,7 @@ TEST(Reduction, StiffeningOfAveragesThatShareNodes)
 TEST(Reduction, SuspectUnits)
 {
   Box box            = bar();
-  box.material.young = 2.1e5; /* N/mm^2 among m and kg */
+  box.material.young = 2.1e5; /* Young's modulus in N/mm^2, lengths in m, mass in kg */
   Made        m(box);
   ReducedBody body;
   Reduction   r = both();
@@ -314,7 +315,7 @@ TEST(Reduction, SuspectUnits)
   Printed printed;
   must(Reduce(m.model, r, &body));
   EXPECT_TRUE(printed.says("units suspect"));
-  /* N, mm, tonne, s is in order, and so is mm, kg, ms */
+  /* The systems N, mm, tonne, s and mm, kg, ms are consistent */
   for (double mass : {7.85e-9, 7.85e-6}) {
     Box        mm = {{6, 2, 2}, {500, 60, 80}, {mass < 1e-8 ? 2.1e5 : 210., 0.3, mass}};
     Made       n(mm);

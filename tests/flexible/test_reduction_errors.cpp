@@ -1,4 +1,4 @@
-/* What the reduction refuses, every error with its message. One rank. */
+/* Everything the reduction refuses, each with its error message; on one rank */
 #include "box_model.h"
 #include "flexible/diagnose.h"
 #include "reduction_cases.h"
@@ -10,7 +10,7 @@ using namespace hhtdae;
 namespace
 {
 
-/* How many objects of PETSc there are on a communicator */
+/* Number of PETSc objects on a communicator */
 PetscInt objects(MPI_Comm comm)
 {
   MPI_Comm          inner;
@@ -23,7 +23,7 @@ PetscInt objects(MPI_Comm comm)
   return count;
 }
 
-/* The message of the error which the reduction has to end with; it leaves no solver or matrix behind */
+/* The message of the error with which the reduction must end; it must leave no solver or matrix behind */
 std::string failure(const FeModel &model, const Reduction &reduction)
 {
   ErrorTrap      trap;
@@ -52,7 +52,7 @@ void clearNode(Mat A, PetscInt node)
   must(MatZeroRowsColumns(A, 3, rows, 0., nullptr, nullptr));
 }
 
-/* Two blocks, two bricks long each, that share an edge along z: a hinge */
+/* Two blocks of two bricks that share only an edge along z: a hinge */
 Box hinge()
 {
   Box box     = {{4, 2, 2}, {0.4, 0.2, 0.2}};
@@ -88,7 +88,7 @@ TEST(ReductionErrors, NoMatrices)
   EXPECT_REDUCTION_SAYS(failure(empty, Reduction()), "read a mesh or matrices first");
 }
 
-/* Geometric stiffening is made of the stress in elements, while something holds the body */
+/* Geometric stiffening needs an attachment that holds the body, and elements for the stress */
 TEST(ReductionErrors, Stiffening)
 {
   Made      m(bar());
@@ -141,7 +141,7 @@ TEST(ReductionErrors, Parts)
   const std::string message = failure(m.model, both());
   EXPECT_REDUCTION_SAYS(message, "falls into 2 parts");
   EXPECT_REDUCTION_SAYS(message, "27 nodes with node 1; 27 nodes with node 28");
-  /* tied to one attachment they are one body */
+  /* tied to one attachment both blocks are one body */
   Reduction joined;
   m.builder.addSet("all ends", [](const Vector3 &x) { return x[0] < 1e-9 || x[0] > 0.5 - 1e-9; });
   joined.attachments = {attach("all ends")};
@@ -158,7 +158,7 @@ TEST(ReductionErrors, Mechanism)
   held.attachments          = {attach("left")};
   const std::string message = failure(m.model, held);
   EXPECT_REDUCTION_SAYS(message, "mechanism");
-  /* the far edge of the second block moves most: x = 0.4, y = 0.2 has the nodes with the highest numbers */
+  /* the far edge of the second block moves most: its nodes, at x = 0.4, y = 0.2, have the highest numbers */
   EXPECT_REDUCTION_SAYS(message, std::to_string(m.model.nodes));
   held.attachments[0].tie = Tie::Average;
   EXPECT_REDUCTION_SAYS(failure(m.model, held), std::to_string(m.model.nodes));
@@ -167,21 +167,21 @@ TEST(ReductionErrors, Mechanism)
   free.attachments = {attach("left")};
   free.method      = Method::FreeFree;
   EXPECT_REDUCTION_SAYS(failure(m.model, free), "mechanism");
-  /* both sides held: the hinge is a joint between two rigid attachments, seen in the reduced pair */
+  /* with both ends held the hinge is a joint between two rigid attachments, which is detected in the reduced pair */
   EXPECT_REDUCTION_SAYS(failure(m.model, both()), "mechanism");
 }
 
 TEST(ReductionErrors, Supports)
 {
   Made spring(bar());
-  setEntry(spring.model.K, 3 * 40, 3 * 40, 1e4, ADD_VALUES); /* soft: the diagonal of K is some 1e9 */
+  setEntry(spring.model.K, 3 * 40, 3 * 40, 1e4, ADD_VALUES); /* soft: the diagonal of K is about 1e9 */
   const std::string message = failure(spring.model, both());
   EXPECT_REDUCTION_SAYS(message, "not free of supports");
   EXPECT_REDUCTION_SAYS(message, "41");
   Made           clamped(bar());
   const PetscInt rows[3] = {0, 1, 2};
   must(MatZeroRowsColumns(clamped.model.K, 3, rows, 1e9, nullptr, nullptr));
-  setEntry(clamped.model.K, 0, 3, -1., ADD_VALUES); /* coupled still, so that it is not a part of its own */
+  setEntry(clamped.model.K, 0, 3, -1., ADD_VALUES); /* a remaining coupling, so that it does not count as a separate part */
   setEntry(clamped.model.K, 3, 0, -1., ADD_VALUES);
   EXPECT_REDUCTION_SAYS(failure(clamped.model, both()), "supports");
 }
@@ -189,7 +189,7 @@ TEST(ReductionErrors, Supports)
 TEST(ReductionErrors, WrongCoordinates)
 {
   Made m(bar());
-  for (std::size_t i = 0; i < m.model.coordinates.size(); i += 3) m.model.coordinates[i] *= 1000; /* mm among m */
+  for (std::size_t i = 0; i < m.model.coordinates.size(); i += 3) m.model.coordinates[i] *= 1000; /* mm in a model in m */
   EXPECT_REDUCTION_SAYS(failure(m.model, both()), "correct the coordinates");
 }
 
@@ -210,7 +210,7 @@ TEST(ReductionErrors, NotANumber)
   EXPECT_REDUCTION_SAYS(failure(n.model, both()), "finite coordinates");
 }
 
-/* Poisson's ratio above a half: a negative bulk modulus */
+/* Poisson's ratio above one half means a negative bulk modulus */
 TEST(ReductionErrors, NegativeStiffness)
 {
   Box box              = bar();
@@ -273,7 +273,7 @@ TEST(ReductionErrors, Attachments)
   named.position = Vector3(NAN, 0, 0);
   EXPECT_REDUCTION_SAYS(with({named}), "not finite");
   EXPECT_REDUCTION_SAYS(with({Attachment()}), "no name");
-  /* averages may share nodes */
+  /* averaging attachments may share nodes */
   Reduction   r;
   ReducedBody body;
   r.attachments = {attach("left", Tie::Average), attach("half", Tie::Average)};

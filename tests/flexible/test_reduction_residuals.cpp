@@ -18,7 +18,7 @@ namespace
 
 constexpr double rounding = 1e-10; /* of eigenvalues, relative; the highest are 1e8 times the lowest */
 
-/* Crooked, so that no frequencies are equal */
+/* A skewed box, so that no frequencies coincide */
 Box crooked()
 {
   Box box = {{10, 2, 2}, {0.5, 0.06, 0.08}};
@@ -51,7 +51,7 @@ MatrixXd dense(Mat A)
   return D;
 }
 
-/* Elastic eigenvalues of the full model, rigid attachments tied */
+/* Elastic eigenvalues of the full model with rigid attachments tied */
 VectorXd spectrum(const FeModel &model, const Reduction &r, const ReducedBody &body)
 {
   const PetscInt n = 3 * model.nodes;
@@ -90,14 +90,14 @@ struct Reduced {
   int    modes() const { return (int)body.mode.size(); }
   double lambda(int k) const { return body.modal.omega[k] * body.modal.omega[k]; }
   double eta(int k) const { return body.mode[k].residual; }
-  double off(int k) const { return lambda(k) / exact[k] - 1; } /* a subspace does not lower it */
+  double off(int k) const { return lambda(k) / exact[k] - 1; } /* never negative, because a subspace does not lower an eigenvalue */
   int    nearest(int k) const
   {
     int at;
     ((lambda(k) - exact.array()).abs() / exact.array()).minCoeff(&at);
     return at;
   }
-  /* |1 - lambda / lambda_j|, least among all but one */
+  /* |1 - lambda / lambda_j|, smallest over all j except one */
   double gap(int k, int but) const
   {
     double least = INFINITY;
@@ -138,13 +138,13 @@ TEST(ReductionResiduals, BoundTheErrorOfEveryMode)
     }
     std::printf("[ MEASURED ] eta^2 is %.3f to %.3f times the error of the first ten, eta up to %.1e, of all to %.1e\n",
                 least, most, r.eta(9), r.body.mode.back().residual);
-    /* the error is eta^2 to eta^2 / (1 - lambda / nu) to first order, nu that of the first mode left out */
+    /* to first order the error is between eta^2 and eta^2 / (1 - lambda / nu), where nu is that of the first mode left out */
     EXPECT_LT(most, 1.1);
     EXPECT_GT(least, 0.3);
   }
 }
 
-/* Those of the first modes with each one that is added; near the highest normal modes they need not */
+/* The residuals of the first modes decrease with additional normal modes; near the highest normal modes this need not hold */
 TEST(ReductionResiduals, FallWithMoreModes)
 {
   for (auto t : ties) {
@@ -170,13 +170,13 @@ TEST(ReductionResiduals, OfConstraintModesAlone)
     ASSERT_EQ(r.modes(), 6);
     expectBounds(r);
     for (int k = 0; k < r.modes(); k++) EXPECT_GT(r.eta(k), 1e-3) << "six modes are no exact ones";
-    /* the same space, asked for in another way */
+    /* the same space, requested in another way */
     const Reduced s(between(t.first, t.second, 0));
     for (int k = 0; k < r.modes(); k++) EXPECT_NEAR(s.eta(k), r.eta(k), 1e-6 * r.eta(k));
   }
 }
 
-/* Eigenvectors of the full model: what is left is that of the eigensolver */
+/* The modes are eigenvectors of the full model, whose residual is that of the eigensolver */
 TEST(ReductionResiduals, OfTheFreeBody)
 {
   for (auto t : ties) {
@@ -184,7 +184,7 @@ TEST(ReductionResiduals, OfTheFreeBody)
     ASSERT_EQ(r.modes(), 20);
     expectBounds(r);
     for (int k = 0; k < r.modes(); k++) EXPECT_LT(r.eta(k), 1e-8) << k;
-    /* a coarse tolerance is seen, and bounded */
+    /* the error of a coarse solver tolerance is noticed and bounded */
     Options       options("-reduce_eps_tol 1e-3 -reduce_eps_ncv 24 -reduce_verify 0");
     const Reduced coarse(between(t.first, t.second, 20, Method::FreeFree));
     expectBounds(coarse);
@@ -194,7 +194,7 @@ TEST(ReductionResiduals, OfTheFreeBody)
   }
 }
 
-/* Slices leave no factorization behind, a selection only some of the modes */
+/* Residuals are the same if modes are computed in slices, which leaves no factorization, or if only some modes are selected */
 TEST(ReductionResiduals, SlicesAndSelectionHaveTheSame)
 {
   Reduction r     = between(Tie::Rigid, Tie::Average, PETSC_DEFAULT);

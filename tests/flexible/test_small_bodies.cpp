@@ -1,4 +1,5 @@
-/* The same steel body at lengths from 0.1 mm to 100 m: in units of its length, wave speed and mass nothing tells one from the other. */
+/* Steel bodies of the same shape with lengths from 0.1 mm to 100 m: scaled by their length, wave speed and mass, all
+   results must be the same */
 #include "dense.h"
 #include "hhtdae/helpers.h"
 #include "hhtdae/linearize.h"
@@ -15,7 +16,7 @@ namespace
 {
 
 constexpr double lengths[] = {1, 100, 2e-2, 1e-3, 1e-4};
-constexpr double width = 0.1, depth = 0.05; /* of the length */
+constexpr double width = 0.1, depth = 0.05; /* relative to the length */
 
 ReducedBody reduced(double l, const Reduction &r)
 {
@@ -28,7 +29,7 @@ ReducedBody reduced(double l, const Reduction &r)
 
 Vector3 middle(double x, double l) { return {x * l, width * l / 2, depth * l / 2}; }
 
-/* Clamped at its left end and, if asked for, at its right one; 1 % damping */
+/* Clamped at its left end and optionally at its right end; 1 % damping */
 struct Cantilever {
   Scene  scene{PETSC_COMM_SELF};
   Body   body;
@@ -59,7 +60,7 @@ template <class A, class B> void expectEqual(const A &a, const B &b, double part
   EXPECT_LE((a - b).norm(), part * b.norm()) << what;
 }
 
-/* Values times the length */
+/* Eigenvalues times the length */
 Eigen::VectorXcd values(const std::vector<Mode> &modes, double l)
 {
   Eigen::VectorXcd v(modes.size());
@@ -74,7 +75,7 @@ Complexs complexOf(const std::vector<double> &x, PetscInt rows, PetscInt columns
 
 } // namespace
 
-/* What a reduction knows. Modes are orthonormal in the mass, which goes with l^3. */
+/* Results of a reduction. Modes are orthonormal in the mass matrix, which is proportional to l^3 */
 TEST(SmallBodies, Reduction)
 {
   for (Tie tie : {Tie::Rigid, Tie::Average}) {
@@ -102,7 +103,7 @@ TEST(SmallBodies, Reduction)
   }
 }
 
-/* Most of the modes that there are, whose Krylov spaces come to an end */
+/* Almost all existing modes are requested, so that Krylov spaces are exhausted */
 TEST(SmallBodies, ManyModes)
 {
   for (Method method : {Method::CraigBampton, Method::FreeFree})
@@ -137,7 +138,7 @@ TEST(SmallBodies, Modes)
   }
 }
 
-/* About a shift of the default, which is far below, and of others */
+/* With the default shift, which is far below the modes, and with others */
 TEST(SmallBodies, SlowestModes)
 {
   for (double l : lengths) {
@@ -152,7 +153,8 @@ TEST(SmallBodies, SlowestModes)
   }
 }
 
-/* Six rigid motions beside elastic ones, or alone: in modal coordinates, and of the whole model, whose stiffness leaves rounding of rigid motions */
+/* Six rigid-body modes beside elastic ones, or alone: in modal coordinates and for the whole model, in which the
+   rounding of the stiffness acts on rigid motions */
 TEST(SmallBodies, SlowestModesOfAFreeBody)
 {
   for (bool whole : {false, true}) {
@@ -171,19 +173,20 @@ TEST(SmallBodies, SlowestModesOfAFreeBody)
       const Taken         t(scene);
       std::vector<Mode>   slow;
       std::vector<double> elastic;
-      must(SlowestModes(t.small, 16, &slow)); /* rigid motions have twelve values */
+      must(SlowestModes(t.small, 16, &slow)); /* each rigid motion has two eigenvalues */
       for (const Mode &m : slow)
         if (std::abs(m.value) > 100 / l) elastic.push_back(std::abs(m.value) * l);
       if (l == 1) one = elastic;
       ASSERT_GE(elastic.size(), 4u) << l;
-      for (std::size_t k = 0; k < 4; k++) EXPECT_NEAR(elastic[k], one[k], 1e-5 * one[k]) << l; /* beside rigid motions the shift stays */
+      for (std::size_t k = 0; k < 4; k++) EXPECT_NEAR(elastic[k], one[k], 1e-5 * one[k]) << l; /* with rigid motions the default shift is kept */
       must(SlowestModes(t.small, 3, &slow, l < 1 ? 300 / l : 1));
       for (const Mode &m : slow) EXPECT_LT(std::abs(m.value), 1 / l) << l;
     }
   }
 }
 
-/* A whole body on a hinge and a soft spring: what a search leaves of fast shapes in the slow one has far more stiffness than that has inertia */
+/* A whole body on a hinge and a soft spring: the small parts of fast modes that an eigensolver leaves in the slow mode
+   have far more stiffness than the slow mode has inertia */
 TEST(SmallBodies, SlowestModesOfAStiffBodyOnASoftSpring)
 {
   for (double stiffness : {3., 300.}) {
@@ -204,19 +207,20 @@ TEST(SmallBodies, SlowestModesOfAStiffBodyOnASoftSpring)
     const Taken       t(scene);
     std::vector<Mode> all, slow;
     must(t.small.modes(&all));
-    const double rigid = std::sqrt(stiffness / (7850 * 0.03 * 0.03 * (1. / 3 + 0.03 * 0.03 / 12))); /* consistent masses have the exact inertia */
+    const double rigid = std::sqrt(stiffness / (7850 * 0.03 * 0.03 * (1. / 3 + 0.03 * 0.03 / 12))); /* the exact inertia of consistent masses */
     for (int count : {1, 3, 6})
       for (double shift : {1., 10., 100.}) {
         SCOPED_TRACE(text("%g N m/rad: %d modes about %g 1/s", stiffness, count, shift));
         must(SlowestModes(t.small, count, &slow, shift));
         ASSERT_EQ((int)slow.size(), count);
         EXPECT_NEAR(std::abs(slow[0].value), rigid, 1e-3 * rigid);
-        for (int k = 0; k < count; k++) EXPECT_NEAR(std::abs(slow[k].value), std::abs(all[k].value), 1e-3 * std::abs(all[k].value)) << k; /* dense algebra loses five digits more beside stiffness */
+        for (int k = 0; k < count; k++) EXPECT_NEAR(std::abs(slow[k].value), std::abs(all[k].value), 1e-3 * std::abs(all[k].value)) << k; /* dense algebra loses five more digits */
       }
   }
 }
 
-/* Eight modes over more than two decades, the fastest far from any shift that suits the slowest: none twice, each to six digits */
+/* Eight modes over more than two decades, the fastest far from any shift that suits the slowest: each is found once,
+   to six digits */
 TEST(SmallBodies, ModesOfAllSpeeds)
 {
   Scene                 scene(PETSC_COMM_SELF);
@@ -249,7 +253,8 @@ TEST(SmallBodies, ModesOfAllSpeeds)
   }
 }
 
-/* Axes turn with flexible bodies where all do so alike; else a notice, in whatever order they come, but of spins that no mode sees */
+/* The axes of the linearization rotate with the flexible bodies if all rotate alike; otherwise a message says so, in
+   any order of the bodies, except for spins too small to affect a mode */
 TEST(SmallBodies, AxesOfSeveralBodies)
 {
   const auto model = std::make_shared<ModalBody>(reduced(1, both(4)).modal);
@@ -274,7 +279,7 @@ TEST(SmallBodies, AxesOfSeveralBodies)
   EXPECT_TRUE(said(50, -50));
 }
 
-/* With options that lose all digits an error, no wrong modes */
+/* Options that lose all digits lead to an error, not to wrong modes */
 TEST(SmallBodies, SlowestModesAreChecked)
 {
   Options           options("-scene_modes_pep_scale none -scene_modes_pep_target 1");
@@ -286,7 +291,7 @@ TEST(SmallBodies, SlowestModesAreChecked)
   EXPECT_TRUE(trap.says("without balance")) << trap.message;
 }
 
-/* A value of many modes: a search has as many of them as rounding tells apart, at first nine of twelve here */
+/* A multiple eigenvalue: a search finds as many of its modes as rounding separates, at first nine of twelve here */
 TEST(SmallBodies, SlowestModesOfEqualParts)
 {
   Scene             scene(PETSC_COMM_SELF);
@@ -316,8 +321,8 @@ TEST(SmallBodies, SlowestModesOfEqualParts)
   }
 }
 
-/* Transfer functions by minimal coordinates and by the sparse system, at rest and beside the first modes; force and moment at the tip to displacement, speed,
-   acceleration and rotation there */
+/* Transfer functions by minimal coordinates and by the sparse system, at low frequency and near the first modes: from
+   force and moment at the tip to displacement, velocity, acceleration and rotation there */
 TEST(SmallBodies, StateSpace)
 {
   const double speeds[] = {0, 400, 3000};
@@ -349,7 +354,7 @@ TEST(SmallBodies, StateSpace)
   }
 }
 
-/* Clamped at both ends no row follows from the others, whatever the size and how many modes there are */
+/* With both ends clamped no constraint is redundant, for any size and number of modes */
 TEST(SmallBodies, Attachments)
 {
   for (Tie tie : {Tie::Rigid, Tie::Average})
@@ -364,7 +369,7 @@ TEST(SmallBodies, Attachments)
       }
 }
 
-/* And in a large scene */
+/* The same in a large scene */
 TEST(SmallBodies, AttachmentsInALargeScene)
 {
   Cantilever beam(1e-4, both(0), true);
@@ -385,7 +390,7 @@ TEST(SmallBodies, AttachmentsInALargeScene)
 namespace
 {
 
-/* A force of 1000 N times the square of the length pulls at the tip, and the scene starts in equilibrium */
+/* A force of 1000 N times the square of the length acts at the tip, and the scene starts in equilibrium */
 void hangLoad(Cantilever &beam, double l)
 {
   UserForce f;
@@ -397,7 +402,7 @@ void hangLoad(Cantilever &beam, double l)
 
 } // namespace
 
-/* Bent by a force at the tip: as far, and found as soon */
+/* Bending by a force at the tip: the same relative deflection in the same number of iterations */
 TEST(SmallBodies, Equilibrium)
 {
   double   one        = 0;
@@ -416,7 +421,8 @@ TEST(SmallBodies, Equilibrium)
   }
 }
 
-/* At rest accelerations are rounding, and those of rotations the larger the smaller a body is: what they leave of the loads decides */
+/* At rest accelerations are rounding errors, and those of rotations are the larger the smaller a body is: the
+   imbalance of loads that they leave decides about convergence */
 TEST(SmallBodies, StartFromEquilibrium)
 {
   double one = 0;

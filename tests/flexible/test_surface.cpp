@@ -1,4 +1,4 @@
-/* The surface of a reduced body: closed, turned outwards, with the modes of its nodes. */
+/* The surface of a reduced body: it is closed, oriented outwards, and has the modes of its nodes */
 #include "fe_mesh.h"
 #include "hhtdae/flexible.h"
 #include "reduced_body.h"
@@ -11,7 +11,7 @@ namespace
 
 constexpr int modes = 3;
 
-/* A body with the model's mesh, modes and stress modes that tell the node */
+/* A body with the model's mesh and with modes and stress modes that identify the node */
 void Dress(const FeModel &model, ReducedBody *body)
 {
   body->comm        = PETSC_COMM_SELF;
@@ -48,7 +48,7 @@ TEST(Surface, IsClosedAndOfTheRightSize)
     Dress(model, &body);
     must(MakeSurface(body, &s));
     const std::size_t nodes = s.point.size() / 3;
-    EXPECT_EQ(nodes, 5u * 4 * 3 - 3 * 2 * 1); /* corners, without those inside */
+    EXPECT_EQ(nodes, 5u * 4 * 3 - 3 * 2 * 1); /* corner nodes except inner ones */
     EXPECT_EQ(s.triangle.size(), 3u * 2 * 2 * (4 * 3 + 3 * 2 + 2 * 4));
     double                             volume = 0, area = 0;
     std::map<std::pair<int, int>, int> edge;
@@ -77,7 +77,7 @@ TEST(Surface, IsClosedAndOfTheRightSize)
   }
 }
 
-/* A cavity has a surface, too; a node without stress modes leaves all of the surface without */
+/* A cavity has a surface as well; if one surface node has no stress modes, the whole surface has none */
 TEST(Surface, Cavities)
 {
   MeshBox box;

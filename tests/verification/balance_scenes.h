@@ -1,5 +1,5 @@
-/* Small scenes, one for each kind of element, in which every load of it acts on bodies that move and turn in space or
- * in the plane. */
+/* Small scenes, one for each kind of element, in which each of its loads acts on bodies that move and rotate in space
+   or in the plane */
 #ifndef HHTDAE_TESTS_BALANCE_SCENES_H
 #define HHTDAE_TESTS_BALANCE_SCENES_H
 
@@ -16,7 +16,7 @@ struct BalanceScene {
   std::shared_ptr<Scene> scene;
   Specs                  specs;
   bool                   planar;
-  Body                   a, b; /* two bodies that fly and spin from the start */
+  Body                   a, b; /* two bodies that move and rotate from the start */
 
   explicit BalanceScene(bool plane)
       : scene(std::make_shared<Scene>(PETSC_COMM_SELF, plane ? Space::Planar : Space::Spatial)), planar(plane)
@@ -53,7 +53,7 @@ struct BalanceCase {
   std::function<void(BalanceScene &)> make;
 };
 
-/* A joint between the two bodies, and one of them on a spring, so that the joint carries loads that change */
+/* A joint between the two bodies; a spring on one of them makes the loads of the joint vary */
 template <class Joint> BalanceCase JointCase(const std::string &name, bool planar, double bend = 0)
 {
   return {name, planar, [bend](BalanceScene &s) {
@@ -285,7 +285,7 @@ inline std::vector<BalanceCase> ForceCases()
   return all;
 }
 
-/* What a potential energy stands for: no damping, no friction */
+/* Cases whose forces have a potential energy: no damping, no friction */
 inline std::vector<BalanceCase> PotentialCases()
 {
   std::vector<BalanceCase> all;

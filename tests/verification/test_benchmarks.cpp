@@ -1,5 +1,4 @@
-/* Published benchmarks at the tolerances of work-precision diagrams: error against tolerance, and digits at tight ones
- */
+/* Published benchmarks at the tolerances of work-precision diagrams: error against tolerance, and digits at tight tolerances */
 #include "problems/fekete.h"
 #include "problems/wheelset.h"
 #include "support.h"
@@ -11,7 +10,7 @@ namespace
 
 double digits(double error) { return -std::log10(error); }
 
-/* Errors in q for rtol = atol = 1e-4, 1e-5, ..., smallest */
+/* Errors in q for rtol = atol = 1e-first, ..., 1e-last */
 std::vector<double> errorsAgainstTolerance(const Problem &p, const std::string &options, int first, int last)
 {
   std::vector<double> q;
@@ -31,7 +30,8 @@ std::vector<double> errorsAgainstTolerance(const Problem &p, const std::string &
   return q;
 }
 
-/* A method of order 2 under an error estimate of order 3 gains a factor 10^(2/3) = 4.6 in a decade of the tolerance */
+/* For a method of order 2 with an error estimate of order 3 the error decreases by the factor 10^(2/3) = 4.6 per
+   decade of the tolerance */
 void expectFalling(const std::vector<double> &q)
 {
   for (size_t k = 0; k + 1 < q.size(); k++) EXPECT_LT(q[k + 1], 1.2 * q[k]) << "decade " << k;
@@ -57,7 +57,7 @@ TEST(Benchmarks, AndrewsSixDigits)
   EXPECT_GE(digits(q[0]), 6.);
 }
 
-/* To the end of IFToMM A03: twice as many revolutions */
+/* Up to the end time of IFToMM A03, twice as many revolutions */
 TEST(Benchmarks, AndrewsLongerRun)
 {
   const std::vector<double> q = errorsAgainstTolerance(Andrews(.05), "-ts_hhtdae_alpha -0.05", 9, 9);
@@ -76,14 +76,14 @@ TEST(Benchmarks, CarAxisSixDigits)
   EXPECT_GE(digits(q[0]), 6.);
 }
 
-/* The paper's form serves as well where M is constant */
+/* The paper's form is as accurate, because M is constant */
 TEST(Benchmarks, CarAxisPaperForm)
 {
   const std::vector<double> q = errorsAgainstTolerance(CarAxis(), "-ts_hhtdae_form paper", 4, 8);
   expectFalling(q);
 }
 
-/* Published digits of other codes: RADAU5 and DASSL at index 2 */
+/* Digits published for other codes: RADAU5 and DASSL at index 2 */
 TEST(Benchmarks, Fekete)
 {
   EXPECT_GE(digits(errorsAgainstTolerance(Fekete(), "", 4, 9).back()), 6.5);
@@ -97,7 +97,7 @@ TEST(Benchmarks, Wheelset)
   EXPECT_GE(digits(errorsAgainstTolerance(Wheelset(), "-ts_hhtdae_order 5", 10, 10).back()), 6.);
 }
 
-/* Its matrix, by dual numbers, against differences near its motion */
+/* The Jacobian of the wheelset, by dual numbers, against differences at states near its motion */
 TEST(Benchmarks, MatrixOfTheWheelset)
 {
   const Wheelset p;

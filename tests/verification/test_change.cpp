@@ -1,4 +1,4 @@
-/* Changes of coordinates in the course of a run: order, error, rejections, predictor, checkpoints, roll-back */
+/* Changes of coordinates during a run: order, error, rejections, predictor, checkpoints, roll-back */
 #include "integrator/state.h"
 #include "tumbling.h"
 
@@ -13,7 +13,7 @@ namespace
 
 using Errors = Tumbling::Errors;
 
-/* The body's y axis, about which it turns, as the z axis of the frame: theta stays away from 0 for a while */
+/* A frame whose z axis is the body's y axis, about which the body rotates, so that theta stays away from 0 for a while */
 const Frame steady = {{{0., 0., 1.}, {1., 0., 0.}, {0., 1., 0.}}};
 
 struct Result {
@@ -21,7 +21,7 @@ struct Result {
   TSHHT3Statistics s;
 };
 
-/* Largest errors after a tenth of the run, when the transient of the start has died out */
+/* Largest errors after a tenth of the run, when the transient of the start has decayed */
 Result measure(const Tumbling &p, const std::string &options, int often, bool turn = true)
 {
   Simulation   run(p, options);
@@ -51,8 +51,8 @@ struct Orders {
   double q, v, a, lambda;
 };
 
-/* `often` steps from one change to the next with the longer steps; twice as many with the shorter ones if `sameTimes`
- */
+/* `often` is the number of longer steps between changes; with `sameTimes` twice as many of the shorter steps, so that
+   changes are at the same times */
 Orders orders(const Tumbling &p, const std::string &options, int steps, int often, bool sameTimes)
 {
   const Result coarse = measure(p, fixedSteps(p.t1 / steps) + options, often),
@@ -116,7 +116,8 @@ TEST(Change, SecondOrderOfAFreeBody)
     expectSecondOrder(p, o, 800);
 }
 
-/* Also of lambda and q'', which a change would spoil if velocities were mapped as tangents alone (misfit.cpp) */
+/* Also for lambda and q'', which would lose accuracy if a change mapped velocities only as tangent vectors and ignored
+   their drift from the constraints (drift.cpp) */
 TEST(Change, SecondOrderWithConstraints)
 {
   const Tumbling p(true, 2.);
@@ -139,7 +140,7 @@ TEST(Change, PaperFormStaysOfFirstOrder)
   }
 }
 
-/* Against runs in one frame all the way, and in one of the best: other frames alone may double or treble the error */
+/* Compared with runs in a single frame that is well suited; other frames alone may double or triple the error */
 TEST(Change, ErrorsAsWithoutChanges)
 {
   for (bool pivot : {false, true}) {
@@ -160,7 +161,7 @@ TEST(Change, ErrorsAsWithoutChanges)
   }
 }
 
-/* Forced changes cost no rejections, and the results differ at the level of the tolerance */
+/* Forced changes cause no rejections, and the results differ by an amount of the size of the tolerance */
 TEST(Change, ErrorControl)
 {
   for (bool pivot : {false, true})
@@ -189,25 +190,25 @@ static void differences(const hht3::Predictor &p, std::vector<Array> &d)
   }
 }
 
-/* History and state after a change against those of a run that has been in the new frame from its start: the same
+/* History and state after a change equal those of a run that has used the new frame from its start: the same
    differences of the predictor, and as many iterations afterwards */
 TEST(Change, HistoryAsIfAlwaysInTheNewFrame)
 {
   for (bool pivot : {false, true}) {
-    PetscInt all[2] = {0, 0}; /* the iterations of one run may happen to be some more or less */
+    PetscInt all[2] = {0, 0}; /* summed, because the numbers of iterations of single runs vary by chance */
     for (const char *o :
          {"-ts_hhtdae_alpha -0.3", "-ts_hhtdae_radius 0.2", "-ts_hhtdae_form paper -ts_hhtdae_alpha -0.3"}) {
       const std::string options =
           fixedSteps(pivot ? .0025 : .01) + o + " -ts_hhtdae_predictor_degree 3 -ts_max_steps 100";
       SCOPED_TRACE((pivot ? "pivot " : "free ") + options);
-      const bool         first_order = options.find("paper") != std::string::npos; /* the two runs differ by so much */
+      const bool         first_order = options.find("paper") != std::string::npos; /* then the two runs differ by an error of first order */
       Frame              frame{};
       std::vector<Array> history[2];
       PetscInt           before[2], after[2], degree[2];
       for (int k = 0; k < 2; k++) {
         const Tumbling    p(pivot, 10., k ? frame : identity());
         Simulation        run(p, options);
-        FrameChanges      changes(run, p, 60, false); /* the transient of the start is over */
+        FrameChanges      changes(run, p, 60, false); /* after the transient of the start has decayed */
         hht3::Integrator &I = hht3::Get(run.ts);
         changes.twist       = !k;
         changes.last        = 60;
@@ -241,7 +242,7 @@ TEST(Change, HistoryAsIfAlwaysInTheNewFrame)
   }
 }
 
-/* A change that changes nothing gives the same bits */
+/* A change to the same coordinates gives the same bits */
 TEST(Change, IdentityKeepsAllBits)
 {
   for (const char *form : {"second_order", "paper"}) {
@@ -263,7 +264,7 @@ TEST(Change, IdentityKeepsAllBits)
   }
 }
 
-/* Entries that the map leaves alone keep theirs in a change that does something */
+/* Entries that a change does not map keep their bits */
 TEST(Change, OtherEntriesKeepTheirBits)
 {
   const Tumbling     p(true, .5, steady);
@@ -306,7 +307,7 @@ TEST(Change, BeforeTheStart)
   }
 }
 
-/* A run resumed between two changes repeats the uninterrupted one bit for bit */
+/* A run resumed between two changes repeats the uninterrupted run bit for bit */
 TEST(Change, Checkpoint)
 {
   for (const char *o : {"", "-ts_hhtdae_form paper "})
@@ -324,7 +325,7 @@ TEST(Change, Checkpoint)
         FrameChanges changes(run, p, 10);
         run.watch = [&](Simulation &r, PetscInt step, double t) {
           if (step > 45) note(steps[0], r, t);
-          if (step == 46) /* at whose beginning that of step 45 was written */
+          if (step == 46) /* at the beginning of this step the checkpoint of step 45 was written */
             std::ofstream(kept.name, std::ios::binary) << std::ifstream(running.name, std::ios::binary).rdbuf();
         };
         must(run.solve());
@@ -342,7 +343,7 @@ TEST(Change, Checkpoint)
       EXPECT_EQ(s[0].changes, s[1].changes);
       EXPECT_EQ(s[0].residuals, s[1].residuals);
       EXPECT_EQ(s[0].factorizations, s[1].factorizations);
-      EXPECT_LT(changes.commits, s[1].changes); /* those after the checkpoint, and one when it was loaded */
+      EXPECT_LT(changes.commits, s[1].changes); /* only those after the checkpoint, plus one when it was loaded */
       EXPECT_GE(changes.commits, 2);
       MEASURED("%s: %d steps after the checkpoint repeated bit for bit, %d changes", p.name.c_str(),
                (int)steps[1].size(), (int)s[1].changes);
@@ -378,7 +379,7 @@ TEST(Change, CheckpointsOfOtherVectorsAreRefused)
   EXPECT_EQ(refusal(without, 0), "");
 }
 
-/* A step taken back after a change starts again in the new coordinates, without another change */
+/* A step rolled back after a change is repeated in the new coordinates, without another change */
 TEST(Change, RollBack)
 {
   for (const char *form : {"second_order", "paper"}) {
@@ -413,7 +414,7 @@ TEST(Change, RollBack)
   }
 }
 
-/* Events are found by rolling back, with changes in between; the body's z axis becomes horizontal */
+/* Events are located by rolling steps back, with changes in between; here the body's z axis becomes horizontal */
 TEST(Change, Events)
 {
   struct Context {
@@ -431,7 +432,7 @@ TEST(Change, Events)
       PetscBool    terminate = PETSC_FALSE;
       const auto   height    = [](TS, PetscReal, Vec U, Indicator f[], void *ctx) -> PetscErrorCode {
         const Tumbling &b = *static_cast<Context *>(ctx)->p;
-        f[0]              = product(rotation313(&whole(U)[b.at]), b.frame)[2][2]; /* of the z axis */
+        f[0]              = product(rotation313(&whole(U)[b.at]), b.frame)[2][2]; /* third component of the z axis */
         return 0;
       };
       const auto note = [](TS, PetscInt, PetscInt[], PetscReal t, Vec, PetscBool, void *ctx) -> PetscErrorCode {
@@ -451,11 +452,11 @@ TEST(Change, Events)
     for (size_t k = 0; k < times[0].size(); k++) widen(worst, std::abs(times[0][k] - times[1][k]));
     MEASURED("%s: %d events, times with and without forced changes differ by %.1e", p.name.c_str(),
              (int)times[0].size(), worst);
-    EXPECT_LT(worst, pivot ? 1e-5 : 1e-3); /* the error of the run, 2e-4 */
+    EXPECT_LT(worst, pivot ? 1e-5 : 1e-3); /* the error of the run is 2e-4 */
   }
 }
 
-/* A restart asked for from outside, and changes before and after it */
+/* A restart requested by the user, with changes before and after it */
 TEST(Change, Restart)
 {
   const Tumbling p(true, 1.);
@@ -486,7 +487,7 @@ TEST(Change, MultipliersAreNotToBeMapped)
   EXPECT_TRUE(trap.says("unknown 6")) << trap.message;
 }
 
-/* A test alone sees every accepted state once, but cannot have new coordinates */
+/* A test without a map is called once for every accepted state, but cannot change coordinates */
 TEST(Change, TestWithoutMap)
 {
   struct Seen {
@@ -522,7 +523,7 @@ TEST(Change, TestWithoutMap)
   EXPECT_TRUE(trap.says("there is no map")) << trap.message;
 }
 
-/* The user's -snes_lag_jacobian does not go on with a matrix of the old coordinates */
+/* With the user's -snes_lag_jacobian a matrix in the old coordinates is not used after a change */
 TEST(Change, UserLag)
 {
   const Tumbling p(true, 1.);

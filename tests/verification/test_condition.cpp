@@ -50,7 +50,7 @@ long double condition(Dense A)
   return largest / smallest;
 }
 
-/* The transpose, whose columns are the rows: what differs in size are rows in (b), rows and columns alike in (a) */
+/* The transpose, with the rows as columns: in (b) the rows differ in size, in (a) both rows and columns */
 Dense rowsOf(Mat P)
 {
   PetscInt n;
@@ -65,7 +65,7 @@ Dense rowsOf(Mat P)
   return A;
 }
 
-/* The integrator's matrix D_r J D_c by its formulas, from the application's Jacobian at the present state */
+/* The integrator's matrix D_r J D_c by its formula, from the application's Jacobian at the present state */
 Dense byFormula(Simulation &run, double h)
 {
   const hht3::Parameters p        = hht3::HHTParameters(-.3, false);
@@ -98,8 +98,8 @@ double difference(const Dense &A, const Dense &B)
   return (double)(d / m);
 }
 
-/* The matrix that the integrator made in the first step of length h, as it stands in SNES. Where it cut such a step, or
-   went without the corrector, by formula. */
+/* The matrix that the integrator made in the first step of length h, taken from the SNES; if it shortened the step or
+   made it without the corrector, the matrix by formula */
 Dense newtonMatrix(Simulation &run, double h)
 {
   SNES snes;

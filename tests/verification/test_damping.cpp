@@ -13,13 +13,13 @@ using namespace hhtest;
 namespace
 {
 
-using Real   = long double; /* least squares square the condition */
+using Real   = long double; /* extended precision, because least squares squares the condition number */
 using Values  = std::array<Real, 3>;
 using Matrix = std::array<Values, 3>;
 
 struct Method {
   Real am, af, gamma, beta;
-  /* Of (2a), (2b) for a_n and a_{n+1}: zero for the trapezoidal rule, where a_n = -w^2 q_n */
+  /* Determinant of (2a), (2b) for a_n and a_{n+1}: zero for the trapezoidal rule, where a_n = -w^2 q_n */
   Real determinant() const { return gamma * (.5L - beta) - beta * (1 - gamma); }
   bool trapezoidal() const { return std::abs(determinant()) < 1e-12L; }
 };
@@ -54,7 +54,7 @@ Values next(const Matrix &A, const Values &x)
 
 Real size(const Values &x) { return std::max({std::abs(x[0]), std::abs(x[1]), std::abs(x[2])}); }
 
-/* Roots of z^3 + c2 z^2 + c1 z + c0 by simultaneous iteration; the largest */
+/* The largest of the roots of z^3 + c2 z^2 + c1 z + c0, by simultaneous iteration */
 Real largestRoot(Real c0, Real c1, Real c2)
 {
   using Complex      = std::complex<Real>;
@@ -79,7 +79,7 @@ Real spectralRadius(const Matrix &A)
   return largestRoot(-det, minors, -trace);
 }
 
-struct Oscillator : Oscillators { /* with any initial state */
+struct Oscillator : Oscillators { /* with arbitrary initial values */
   double q0, v0;
   Oscillator(double w, double q, double v, double end) : Oscillators({w}, {0.}, false, end), q0(q), v0(v) {}
   void initial(double *u, double *v) const override
@@ -98,7 +98,7 @@ std::vector<Values> states(double hw, double q0, double v0, const std::string &o
   Simulation         run(p, fixedSteps(1.) + options + " -ts_rtol 1e-13 -ts_atol 1e-13");
   run.watch = [&](Simulation &r, PetscInt, double) { x.push_back({r.u()[0], r.v()[0], 0}); };
   must(run.solve());
-  for (int n = 0; n < N; n++) { /* (2a), (2b) for a_n and a_{n+1} */
+  for (int n = 0; n < N; n++) { /* solves (2a), (2b) for a_n and a_{n+1} */
     const Real b = x[n + 1][0] - x[n][0] - x[n][1], c = x[n + 1][1] - x[n][1];
     x[n][2] = m.trapezoidal() ? -(Real)hw * hw * x[n][0] : (m.gamma * b - m.beta * c) / m.determinant();
   }
@@ -106,8 +106,8 @@ std::vector<Values> states(double hw, double q0, double v0, const std::string &o
   return x;
 }
 
-/* The matrix that maps each x_n to x_{n+1} best, from the runs' first states; of the trapezoidal rule the one for (q, h
- * q') */
+/* The matrix that maps each x_n to x_{n+1} in the least-squares sense, from the first states of the runs; for the
+   trapezoidal rule the matrix for (q, h q') */
 Matrix fit(const std::vector<std::vector<Values>> &runs, int pairs, bool two)
 {
   Real S[3][3] = {}, T[3][3] = {};
@@ -127,7 +127,7 @@ Matrix fit(const std::vector<std::vector<Values>> &runs, int pairs, bool two)
       S[i][2] = S[2][i] = i == 2;
       T[i][2] = T[2][i] = 0;
     }
-  Matrix A; /* A S = T, S symmetric: Cramer's rule row by row */
+  Matrix A; /* A S = T with symmetric S: Cramer's rule row by row */
   auto   det = [](const Real M[3][3]) {
     return M[0][0] * (M[1][1] * M[2][2] - M[1][2] * M[2][1]) - M[0][1] * (M[1][0] * M[2][2] - M[1][2] * M[2][0]) +
            M[0][2] * (M[1][0] * M[2][1] - M[1][1] * M[2][0]);
@@ -161,7 +161,7 @@ void compare(const char *name, const std::string &options, const Method &m)
     MEASURED("%-22s h w = %-6g spectral radius %.8Lf, measured %.8Lf (difference %.1Le), states to %.1Le", name, hw,
              theory, measured, measured - theory, difference);
     EXPECT_LT(difference, 1e-8);
-    EXPECT_NEAR((double)measured, (double)theory, hw < 0.02 ? 1e-4 : 1e-6); /* there a consistent start hardly excites what the fit is to see; the states have seen it */
+    EXPECT_NEAR((double)measured, (double)theory, hw < 0.02 ? 1e-4 : 1e-6); /* a consistent start hardly excites the third root */
     EXPECT_LE((double)theory, 1. + 1e-12);
   }
 }
@@ -187,7 +187,7 @@ TEST(Damping, Radius)
     compare(text("radius %.4g", rho).c_str(), text("-ts_hhtdae_radius %.17g", rho), radius(rho));
 }
 
-/* The radius at infinity that the setters promise */
+/* The spectral radius at infinity has the value that the setters state */
 TEST(Damping, RadiusAtInfinity)
 {
   for (double rho : {0.1, .5, .9, 1.}) EXPECT_NEAR((double)spectralRadius(amplification(radius(rho), 1e7)), rho, 1e-4);

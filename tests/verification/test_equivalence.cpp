@@ -59,7 +59,7 @@ TEST(Equivalence, SpringPendulum) { compare(SpringPendulum(1e3, 1.), 400, 1e-10)
 TEST(Equivalence, Chain) { compare(Chain(5, 0., .5), 200, 1e-8); }
 TEST(Equivalence, CarAxis) { compare(CarAxis(), 600, 1e-8); }
 
-/* Where M varies they are not the same: the comparison above would notice */
+/* With variable M the forms differ, so that the comparison above is sensitive */
 TEST(Equivalence, NotForVariableMass)
 {
   const DoublePendulum p(1.);
@@ -67,7 +67,7 @@ TEST(Equivalence, NotForVariableMass)
   EXPECT_GT(difference(x.u, y.u, {0, 1}), 1e-4);
 }
 
-/* At alpha = -1/3 HHT is Chung and Hulbert's method of radius 1/2; elsewhere it is not */
+/* HHT with alpha = -1/3 is Chung and Hulbert's method of radius 1/2; with other alpha it is not */
 TEST(Equivalence, RadiusOneHalf)
 {
   const Oscillators p({1.}, {0.}, false, 4.);

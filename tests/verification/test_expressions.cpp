@@ -1,4 +1,4 @@
-/* Scenes with user-defined variables, states and user's forces, run and compared with what is known otherwise. */
+/* Scenes with user-defined variables, first-order states and user's forces, compared with independent solutions */
 #include "hhtdae/scene.h"
 #include "scene/runtime.h"
 #include "support.h"
@@ -10,7 +10,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Runs a scene to `end`; values of its variables and states by their handles */
+/* Runs a scene to `end`; returns values of its variables and states by their handles */
 class ExpressionRun
 {
 public:
@@ -45,7 +45,7 @@ const std::string tight = " -ts_rtol 1e-10 -ts_atol 1e-10 -ts_hhtdae_corrector_t
 
 constexpr double mass = 1.5, length = .8, inertia = .3, gravity = 9.81, kp = 25, kd = 4, lag = .05, target = .7;
 
-/* theta, theta', x by the classical Runge-Kutta method; theta from the downward vertical */
+/* theta, theta', x by the classical Runge-Kutta method; theta is measured from the downward vertical */
 std::array<double, 3> Reference(double end, int steps)
 {
   using Y      = std::array<double, 3>;
@@ -116,7 +116,7 @@ TEST(Expressions, ControlledPendulum)
     }
 }
 
-/* Second order in all that a state drives */
+/* Everything that a state acts on is of second order */
 TEST(Expressions, OrderOfTheControlledPendulum)
 {
   const auto exact = Reference(.5, 20000);
@@ -144,7 +144,7 @@ TEST(Expressions, AnglesCountTurns)
   }
 }
 
-/* Reactions at rest, as variables: weight, its moment about a fixed end, and the same by multipliers */
+/* Reactions at rest as variables: the weight, its moment about a clamped end, and the same from multipliers */
 TEST(Expressions, ReactionsOfACantilever)
 {
   Scene s(PETSC_COMM_SELF);
@@ -175,8 +175,8 @@ TEST(Expressions, ReactionsOfACantilever)
 namespace
 {
 
-/* A body in space under forces and moments in its own axes, with a reaction on another body; a force that reads
- * accelerations */
+/* A body in space under forces and moments in its own axes, with a reaction on another body, and a force that depends
+   on accelerations */
 struct Drifting {
   Scene                 scene{PETSC_COMM_SELF};
   Body                  a, b;
@@ -216,7 +216,7 @@ struct Drifting {
 
 } // namespace
 
-/* Carried or eliminated, a force is the same force; action and reaction balance. */
+/* A force has the same effect as a force state and when it is eliminated; action and reaction balance */
 TEST(Expressions, CarriedAndEliminatedAgree)
 {
   Drifting e(false), c(true);
@@ -229,8 +229,7 @@ TEST(Expressions, CarriedAndEliminatedAgree)
   EXPECT_GT(std::abs(eliminated.position(e.a, 0)), .05);
 }
 
-/* An added mass: a force -m_a x'' makes a falling body as slow as one that weighs m_a more, in either form of the
- * method. */
+/* Added mass: a force -m_a x'' slows a falling body like an additional inertia m_a, in both forms of the method */
 TEST(Expressions, AddedMass)
 {
   for (const char *form : {"-ts_hhtdae_form paper", "-ts_hhtdae_form second_order"}) {
@@ -254,7 +253,7 @@ TEST(Expressions, AddedMass)
   }
 }
 
-/* A function that is not finite fails the step, and the information tells whose it was. */
+/* A function that returns a value which is not finite makes the step fail, and -info names the function */
 TEST(Expressions, FunctionsThatAreNotFiniteFailTheRun)
 {
   Scene s(PETSC_COMM_SELF);

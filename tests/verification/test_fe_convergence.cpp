@@ -18,8 +18,7 @@ using namespace hhtest;
 namespace
 {
 
-/* The eigenvalue of the free part of (K, M) that is nearest to a given one; held: degrees of freedom that do not move
- */
+/* The eigenvalue of the free part of (K, M) nearest to a given one; held: degrees of freedom that are fixed */
 double nearest(const FeModel &model, const std::function<bool(const Vector3 &, int)> &held, double target)
 {
   std::vector<PetscInt> rows;
@@ -38,7 +37,7 @@ double nearest(const FeModel &model, const std::function<bool(const Vector3 &, i
   must(EPSCreate(model.comm, &eps));
   must(EPSSetOperators(eps, K, M));
   must(EPSSetProblemType(eps, EPS_GHEP));
-  must(EPSSetTarget(eps, 1.01 * target)); /* not an eigenvalue to the last digit */
+  must(EPSSetTarget(eps, 1.01 * target)); /* shifted, because the target must not be an eigenvalue to the last digit */
   must(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
   must(EPSSetTolerances(eps, 1e-12, 1000));
   must(EPSGetST(eps, &st));
@@ -61,7 +60,7 @@ double nearest(const FeModel &model, const std::function<bool(const Vector3 &, i
   return value;
 }
 
-struct SlepcHere { /* SLEPc starts after PETSc, which runs already */
+struct SlepcHere { /* initializes SLEPc after PETSc, which has been initialized by main() */
   SlepcHere()
   {
     PetscBool there;
@@ -70,7 +69,7 @@ struct SlepcHere { /* SLEPc starts after PETSc, which runs already */
   }
 };
 
-/* Errors of frequencies on meshes of growing fineness, and the rate of the last two */
+/* Errors of frequencies on successively refined meshes, and the rate of convergence of the last two */
 struct Study {
   const char                               *name;
   std::function<MeshBox(ElementType, int)>      box;
@@ -96,7 +95,7 @@ void run(const Study &study, ElementType type, const std::vector<int> &sizes, do
   MEASURED("%s, %s: rate %.2f", study.name, hhtdae::fe::ShapeName(type), measured);
   EXPECT_GT(measured, rate - .35);
   EXPECT_LT(measured, rate + 1.);
-  EXPECT_GT(error[last], 0); /* displacements that fit make a body too stiff */
+  EXPECT_GT(error[last], 0); /* conforming displacements make a body too stiff */
   EXPECT_LT(error[last], rate > 3 ? 2e-3 : .12);
 }
 
@@ -106,14 +105,14 @@ Study bar()
   return {
       "bar",
       [](ElementType t, int n) { return MeshBox{t, 2 * n, n, n, 2, .5, .5, false, [](const Vector3 &x) { return x; }}; }, m,
-      [](const Vector3 &x, int d) { return d > 0 && std::abs(x[d]) < 1e-9; }, /* stands on two planes */
+      [](const Vector3 &x, int d) { return d > 0 && std::abs(x[d]) < 1e-9; }, /* supported on two planes */
       PETSC_PI / 2 * std::sqrt(m.young / m.density)};
 }
 
 Study tube()
 {
   const Material m{2, .3, 3};
-  const auto     bend = [](const Vector3 &x) { /* y: angle, z: radius */
+  const auto     bend = [](const Vector3 &x) { /* x: axis, y: angle, z: radius */
                                            const double a = PETSC_PI / 2 * (1 - x[1]), r = 1 + x[2];
                                            return Vector3(x[0], r * std::cos(a), r * std::sin(a));
   };
@@ -132,7 +131,7 @@ double bendingWave(const Material &m, double k, double h)
     const double p = std::sqrt(k * k - w * w / cl2), q = std::sqrt(k * k - w * w / ct2);
     return (k * k + q * q) * (k * k + q * q) * std::tanh(h * p) - 4 * k * k * p * q * std::tanh(h * q);
   };
-  /* of the opposite sign on the two sides of the root; at omega = 0 both parts agree */
+  /* the function has opposite signs on the two sides of the root; at omega = 0 both parts agree */
   double low = 1e-3 * k * std::sqrt(ct2), high = (1 - 1e-12) * k * std::sqrt(ct2);
   if (f(low) * f(high) > 0) throw std::runtime_error("no root of the equation of Rayleigh and Lamb");
   for (int i = 0; i < 200; i++) {
@@ -194,7 +193,7 @@ TEST_P(FeConvergence, PlateInBending)
     run(plate(), GetParam(), {4, 8}, 2);
 }
 
-/* The thin limit of the exact solution is Kirchhoff's plate */
+/* In the thin limit the exact solution is that of Kirchhoff's plate */
 TEST(FeConvergenceReference, RayleighLambHasKirchhoffsLimit)
 {
   const Material m{2, .3, 3};

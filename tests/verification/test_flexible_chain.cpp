@@ -1,5 +1,5 @@
 /* A mechanism with a flexible arm, in modal coordinates and as the whole geometrically nonlinear finite-element model:
-   deflection and reactions side by side. */
+   deflections and reactions are compared */
 #include "box_model.h"
 #include "hhtdae/flexible.h"
 #include "scene_output.h"
@@ -11,17 +11,17 @@ namespace
 
 const Material soft{2e9, 0.3, 1200};
 
-/* A plate-like arm of bricks along x, thin across the plane that it turns in */
+/* An arm of bricks along x, thin in the direction across its plane of rotation */
 struct ArmModel {
   FeModel model{PETSC_COMM_SELF};
   ArmModel() { BoxBuilder({{12, 1, 2}, {0.6, 0.01, 0.04}, soft}, &model); }
 };
 
 struct Motion {
-  double angle, duration; /* of a smooth turn, that rest follows for half the time */
+  double angle, duration; /* of a smooth rotation, followed by rest for half of the time */
 };
 
-/* Columns of a history: deflection of the tip in the hub's axes, forces in the pin, moments of weld and drive */
+/* Columns of a history: deflection of the tip in the hub's axes, forces in the pin, moments of the weld and the drive */
 enum { Time, Deflection, PinAlong, PinAcross, Weld, Drive };
 using Rows = std::vector<Array>;
 
@@ -33,7 +33,7 @@ std::vector<Attachment> ends()
   return a;
 }
 
-/* Turned by a drive at the hub; a block is welded to the tip. No gravity */
+/* A drive at the hub rotates the arm; a block is welded to the tip; no gravity */
 void mechanism(Scene &scene, Body hub, Body tip, const Motion &motion)
 {
   const Vector3 p(0, 0.005, 0.02), q(0.6, 0.005, 0.02);
@@ -94,7 +94,7 @@ Rows modalRun(const FeModel &model, PetscInt modes, const Motion &motion, int st
   return histories(scene, motion, steps);
 }
 
-/* Root mean square of a column's difference, as a part of the column's own */
+/* Root mean square of the difference of a column, relative to that of the column */
 double difference(const Rows &a, const Rows &b, int column)
 {
   double sum = 0, all = 0;
@@ -108,8 +108,8 @@ double difference(const Rows &a, const Rows &b, int column)
 
 } // namespace
 
-/* Small turns, so that what is left out of the modal body, quadratic in the deformation, does not hide what the modes
- * leave out */
+/* Small rotations, so that terms quadratic in the deformation, which the modal body neglects, are smaller than the
+   error of the truncated modes */
 TEST(FlexibleChain, DifferenceFallsWithModes)
 {
   const ArmModel arm;
@@ -132,12 +132,11 @@ TEST(FlexibleChain, DifferenceFallsWithModes)
   EXPECT_LT(last[3], 1e-5);
 }
 
-/*
-  What the modes cannot give: the pull of the rotation stiffens the arm, and bending shortens it. The first is a
-  difference that goes with the square of the speed, here one percent of the deflection where the arm reaches 15 rad/s.
-  The second is in the force along the arm, second order in the motion as that force is itself, so that its part depends
-  on how fast the motion is against the arm's frequencies, and not on how far it goes.
-*/
+/* Two effects that the modes without stiffening cannot represent: the axial load of the rotation stiffens the arm, and
+   bending shortens it. The first effect is a difference proportional to the square of the speed, here one percent of
+   the deflection where the arm reaches 15 rad/s. The second effect appears in the force along the arm. It is of second
+   order in the motion, as this force itself is, so that its relative size depends on how fast the motion is compared
+   with the arm's frequencies, not on its amplitude */
 TEST(FlexibleChain, StiffeningGoesWithTheSquareOfTheSpeed)
 {
   const ArmModel arm;

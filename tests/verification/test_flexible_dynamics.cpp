@@ -1,4 +1,4 @@
-/* Flexible bodies in motion: an independent solution, the limit of a rigid body, what is conserved. */
+/* Flexible bodies in motion: comparison with an independent solution, the rigid limit, conserved quantities */
 #include "flexcrank_model.h"
 #include "hhtdae/scene.h"
 #include "modal_cloud.h"
@@ -33,7 +33,7 @@ RigidBody sameRigid(const ModalCloud &c)
 
 } // namespace
 
-/* The flexible slider-crank in its own coordinates, solved by extrapolation: second order, down to 1e-9 of a metre */
+/* The flexible slider-crank in its own coordinates, solved by extrapolation; the error is of second order down to 1e-9 m */
 TEST(FlexibleDynamics, SimeonsSliderCrank)
 {
   double error[2];
@@ -68,7 +68,7 @@ TEST(FlexibleDynamics, WithoutModesIsTheRigidBody)
       far             = scene.marker(body, c.X[1]);
     }
     const Vector3 at = DataOf(scene).frame(pivot).x;
-    for (auto &b : DataOf(scene).bodies) b.v = b.w.cross(b.r - at); /* turns about the pivot */
+    for (auto &b : DataOf(scene).bodies) b.v = b.w.cross(b.r - at); /* rotation about the pivot */
     scene.add("ball", Spherical{pivot, scene.marker(scene.ground(), at)});
     for (int k = 0; k < 3; k++) scene.channel(std::string(1, "xyz"[k]), Measure::displacement(far, k));
     SceneRun run(scene, 1, fixed(1e-3) + " -ts_hhtdae_corrector_tolerance 1e-9 ");
@@ -78,7 +78,7 @@ TEST(FlexibleDynamics, WithoutModesIsTheRigidBody)
   for (int k = 0; k < 3; k++) EXPECT_NEAR(x[0][k], x[1][k], 1e-10);
 }
 
-/* Free flight with spin and vibration: error of energy and momentum goes with the square of the step */
+/* Free flight with spin and vibration: the errors of energy and momentum are proportional to the square of the step */
 static void flyFreely(const ModalCloud &c)
 {
   double drift[2][2];
@@ -88,7 +88,7 @@ static void flyFreely(const ModalCloud &c)
     TemporaryFile file(text("balance%d.csv", k));
     b.deformation_rate = Eigen::Vector4d(0.5, -1, 0.3, 0.8);
     const Body body = scene.add("body", b);
-    scene.add("spring", SpringDamper{scene.marker(scene.attachment(body, "tip")), scene.marker(scene.attachment(body, "hub")), 5, 0, 0.5}); /* loads on attachments */
+    scene.add("spring", SpringDamper{scene.marker(scene.attachment(body, "tip")), scene.marker(scene.attachment(body, "hub")), 5, 0, 0.5}); /* forces on attachments */
     scene.output().balance      = true;
     scene.output().balance_file = file.name;
     SceneRun run(scene, 5, fixed(4e-3 / (1 << k)) + " -ts_hhtdae_alpha 0 ");
@@ -116,7 +116,7 @@ TEST(FlexibleDynamics, EnergyAndMomentumOfAFreeBody)
   flyFreely(c);
 }
 
-/* Falling without spin strains nothing; a spin does, by the centrifugal load */
+/* Falling without spin causes no strain; a spin causes strain by the centrifugal load */
 TEST(FlexibleDynamics, RigidMotionCausesNoStrain)
 {
   for (double spin : {0., 3.}) {

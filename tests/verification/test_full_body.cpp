@@ -1,4 +1,5 @@
-/* A finite-element model in motion: its frequency, what is conserved, against its own modes, in fast rotation. */
+/* A whole finite-element model in motion: its frequencies, conserved quantities, comparison with its own modes, fast
+   rotation */
 #include "dense.h"
 #include "beam_bodies.h"
 #include "hhtdae/modes.h"
@@ -28,7 +29,7 @@ hhtex::SolidBeam slender(int elements = 6)
   return b;
 }
 
-/* The same on every rank's own communicator: the tests run on one */
+/* On each rank's own communicator, since these tests run on one rank */
 struct BeamMesh {
   FeModel model{PETSC_COMM_SELF};
   explicit BeamMesh(const hhtex::SolidBeam &b) { must(ReadSolidBeam(b, &model)); }
@@ -43,7 +44,7 @@ Eigen::MatrixXd dense(Mat A, const std::vector<PetscInt> &rows)
   return D;
 }
 
-/* Circular frequency of the first mode with all nodes of the root held, from the matrices themselves */
+/* Circular frequency of the first mode with all nodes of the root fixed, computed from the matrices */
 double firstFrequency(const FeModel &m)
 {
   std::vector<PetscInt> rows;
@@ -54,7 +55,7 @@ double firstFrequency(const FeModel &m)
   return std::sqrt(hhtest::EigenvaluesOf(dense(m.K, rows), dense(m.M, rows))(0));
 }
 
-/* A channel over time, at the ends of steps */
+/* Values of a channel at the ends of steps */
 Array history(Scene &scene, double end, const std::string &options, const std::string &name, Array *time = nullptr)
 {
   TemporaryFile file(name + ".csv");
@@ -68,11 +69,9 @@ Array history(Scene &scene, double end, const std::string &options, const std::s
 
 } // namespace
 
-/*
-  A cantilever swings about its sag; the damping lets the higher modes die out first. At alpha = 0 the method is the trapezoidal
-  rule, whose circular frequency with the step h is 2/h atan(omega h/2) for an undamped mode, and with constraints weakly unstable; alpha = -0.001
-  changes the frequency by 4e-6.
-*/
+/* A cantilever oscillates about its static deflection; the damping removes the higher modes first. At alpha = 0 the
+   method is the trapezoidal rule, which for an undamped mode has the circular frequency 2/h atan(omega h/2) with the
+   step h, and which is weakly unstable with constraints; alpha = -0.001 changes the frequency by 4e-6 */
 TEST(FullBodyDynamics, CantileverSwingsAtItsFrequency)
 {
   const BeamMesh m(slender());
@@ -93,7 +92,7 @@ TEST(FullBodyDynamics, CantileverSwingsAtItsFrequency)
   double      sag = 0, amplitude = 0;
   std::size_t last = z.size() - 10 * 50;
   for (std::size_t i = last; i < z.size(); i++) sag += z[i] / (double)(z.size() - last);
-  Array crossing; /* upward, by a cubic through four points around it */
+  Array crossing; /* upward zero crossings, by a cubic through the four points around each */
   for (std::size_t i = 10 * 50; i + 2 < z.size(); i++) {
     widen(amplitude, std::abs(z[i] - sag));
     if (!(z[i] < sag && z[i + 1] >= sag)) continue;
@@ -115,8 +114,9 @@ TEST(FullBodyDynamics, CantileverSwingsAtItsFrequency)
   EXPECT_GT(std::abs(found / omega - 1), 1e-3) << "the step's effect is not seen";
 }
 
-/* Some of many rows of the residual look by chance as if they had not followed a correction, other ones in every step. As long as the time since
-   the last proof was one for all rows, these added up to a doubt, and to 14 matrices in these 20 steps. */
+/* Among many rows of the residual some seem, by chance, not to have decreased after a correction, different ones in
+   every step. When the time since the last proof was one for all rows, these cases added up, and 14 matrices were made
+   in these 20 steps */
 TEST(FullBodyDynamics, FixedStepsOfManyNodesKeepTheirMatrix)
 {
   hhtex::SolidBeam rubber;
@@ -148,7 +148,8 @@ TEST(FullBodyDynamics, FixedStepsOfManyNodesKeepTheirMatrix)
   EXPECT_LE(all.jacobians - first.jacobians, 4);
 }
 
-/* By default and by a factor: the same motion and, between steps, accelerations; the solvers that made them show themselves */
+/* By default (conjugate gradients) and by a factorization: the same motion and the same accelerations between steps;
+   -ts_view shows which solver was used */
 TEST(FullBodyDynamics, LargeBodyByConjugateGradientsAsByAFactor)
 {
   hhtex::SolidBeam rubber;
@@ -236,8 +237,9 @@ static hhtex::SolidBeam tetrahedra()
   return block;
 }
 
-/* A load that sets in within four steps: what the rates at the start predict for the end of the first step is far from it, and Newton's method goes astray there. From the last
-   values it does not; otherwise h would be cut, and stay short. */
+/* A load that sets in within four steps: the rates at the start predict values at the end of the first step that are
+   far off, and Newton's method diverges from them. Starting from the last values it converges; otherwise h would be
+   reduced, and stay short */
 TEST(FullBodyDynamics, FirstOfFixedStepsAsAsked)
 {
   LoadedBody       beam(tetrahedra(), LoadedBody::constant(0), Expression{{Measure::time()}, [](const Real *t) -> Real { return -1e7 * min(t[0] / 0.02, 1.); }});
@@ -250,8 +252,9 @@ TEST(FullBodyDynamics, FirstOfFixedStepsAsAsked)
   EXPECT_EQ(s.h_min, 5e-3);
 }
 
-/* A load that comes at once, in steps that do not resolve how the ends of the body ring. What conjugate gradients leave of a first correction is more in the positions than
-   the correction has, which is no reason for another matrix. */
+/* A load that acts suddenly, with steps that do not resolve the vibration of the ends of the body. The error that
+   conjugate gradients leave in the first correction is larger in the positions than the correction itself, which is no
+   reason for another matrix */
 TEST(FullBodyDynamics, LoadThatComesAtOnce)
 {
   PetscReal end[2];
@@ -276,8 +279,9 @@ TEST(FullBodyDynamics, LoadThatComesAtOnce)
   EXPECT_NEAR(end[0], end[1], 1e-5 * std::abs(end[1]));
 }
 
-/* A thin plate under a load that comes at once, in steps of many periods of its thickness. The accelerations of the start, and those that ring from step to step, predict strains of
-   hundreds; from where a step begins the correction converges, and the steps that follow begin there at once. */
+/* A thin plate under a sudden load, with steps of many periods of its thickness vibration. The accelerations of the
+   start, and those that oscillate from step to step, predict strains of order 100. The correction converges if it
+   starts from the values at the beginning of the step, and the following steps start from these at once */
 TEST(FullBodyDynamics, FixedStepsOfAThinPlate)
 {
   hhtex::SolidBeam plate;
@@ -298,7 +302,7 @@ TEST(FullBodyDynamics, FixedStepsOfAThinPlate)
   EXPECT_LE(s.retries, 2);
 }
 
-/* Free flight with spin, which pulls the body apart, so that it vibrates: errors go with the square of the step */
+/* Free flight with a spin whose centrifugal load makes the body vibrate: errors are proportional to the square of the step */
 TEST(FullBodyDynamics, EnergyAndMomentumOfAFreeBody)
 {
   hhtex::SolidBeam block = slender(3);
@@ -343,12 +347,12 @@ TEST(FullBodyDynamics, EnergyAndMomentumOfAFreeBody)
   EXPECT_LT(drift[2][2], 1e-9);
 }
 
-/* ---- modes against the model that they come from ---- */
+/* ---- modes against the model from which they were made ---- */
 
 namespace
 {
 
-/* Displacement of the tip of a cantilever after a sudden small force on it, oblique, at many times */
+/* Displacement of the tip of a cantilever after a small oblique force is applied suddenly, at many times */
 Array struck(const FeModel &model, PetscInt modes, double force)
 {
   Scene           scene(PETSC_COMM_SELF);
@@ -384,7 +388,8 @@ Array struck(const FeModel &model, PetscInt modes, double force)
 
 } // namespace
 
-/* Small displacements: all modes of the model give its motion but for terms of second order; fewer modes less of it */
+/* Small displacements: all modes of the model together give its motion except for terms of second order; with fewer
+   modes the error is larger */
 TEST(FullBodyDynamics, ModesAgainstTheModel)
 {
   const BeamMesh m(slender(2)); /* 32 nodes, of which 16 are not at an attachment */
@@ -405,12 +410,10 @@ TEST(FullBodyDynamics, ModesAgainstTheModel)
   EXPECT_NEAR(larger / error, 30, 10) << "what is left must be of second order in the displacement";
 }
 
-/*
-  A stiff bar in fast rotation is longer by L (tan(a L)/(a L) - 1), a = Omega sqrt(rho/E); its strain is 1e-4, of which
-  terms of second order are a ten thousandth. So is the effect of the step: on a circle the method's acceleration is
-  larger than Omega^2 r by c (Omega h)^2, where for its parameters, with f = -alpha,
-  c = -1/12 + (1/4 + beta - gamma/2) - (gamma - 1/2)^2/2 + f (1 - f)/2.
-*/
+/* A stiff bar in fast rotation is longer by L (tan(a L)/(a L) - 1), a = Omega sqrt(rho/E); its strain is 1e-4, so that
+   terms of second order are a relative 1e-4. The effect of the step is of the same size: on a circle the method's
+   acceleration is larger than Omega^2 r by the relative amount c (Omega h)^2, where for its parameters, with f =
+   -alpha, c = -1/12 + (1/4 + beta - gamma/2) - (gamma - 1/2)^2/2 + f (1 - f)/2 */
 TEST(FullBodyDynamics, BarInFastRotation)
 {
   hhtex::SolidBeam bar = slender(4);
@@ -444,7 +447,7 @@ TEST(FullBodyDynamics, BarInFastRotation)
   EXPECT_NEAR((error[0] - error[1]) / (spin * spin * 2e-3 * 2e-3 * 0.75), c, 0.1 * c);
 }
 
-/* Slowest modes about rest, by sparse algebra over nodes and multipliers, against the matrices themselves */
+/* Slowest modes about rest, by sparse algebra over nodes and multipliers, against the matrices */
 TEST(FullBodyModes, ClampedBeam)
 {
   const BeamMesh    m(slender());
@@ -468,7 +471,7 @@ TEST(FullBodyModes, ClampedBeam)
   for (std::size_t k = 1; k < modes.size(); k++) EXPECT_NEAR(modes[k].dampingRatio() / std::abs(modes[k].value), ratio / omega, 1e-6 * ratio / omega);
 }
 
-/* Nothing holds the body: six motions that nothing drives back, and the first bending modes */
+/* A free body: six rigid-body modes without stiffness, and the first bending modes */
 TEST(FullBodyModes, FreeBeam)
 {
   const BeamMesh        m(slender());

@@ -1,5 +1,5 @@
-/* Orders three to five: observed orders, dense output, restarts, roll-back, checkpoints, changes of coordinates, and what the choice of the order does where an oscillation is
-   not resolved */
+/* Orders three to five: observed orders, dense output, restarts, roll-back, checkpoints, changes of coordinates, and
+   the choice of the order where an oscillation is not resolved */
 #include "support.h"
 #include "tumbling.h"
 
@@ -13,7 +13,8 @@ namespace
 
 std::string ofOrder(int k) { return text(" -ts_hhtdae_order %d ", k); }
 
-/* Up to h from steps a hundred times shorter, so that what the steps of order two leave there counts nothing */
+/* Increases the step up to h from steps a hundred times shorter, so that errors of the first steps, of order two, are
+   negligible */
 void growTo(Simulation &run, double h)
 {
   for (double s = .01 * h; s < h; s *= 1.2) {
@@ -25,7 +26,7 @@ void growTo(Simulation &run, double h)
 
 std::string strict() { return fixedSteps(.01) + " -ts_max_time 1e3 "; }
 
-/* Largest errors with steps h, ratio h, h, ratio h ..., in the second half of the run */
+/* Largest errors in the second half of the run, with steps h, ratio h, h, ratio h, ... */
 ProblemErrors errorsAt(const Problem &p, double h, double ratio, const std::string &options)
 {
   Simulation    run(p, strict() + options);
@@ -61,7 +62,7 @@ Orders measure(const Problem &p, int k, double h, double ratio)
 
 enum class Multipliers { None, Judged };
 
-/* h for order 3; longer for the others, whose errors would soon be rounding */
+/* h is the step for order 3; higher orders use longer steps, because their errors would soon be rounding errors */
 void expectOrders(const Problem &p, double h, Multipliers lambda, bool others = false)
 {
   for (double ratio : {1., 1.2})
@@ -71,7 +72,7 @@ void expectOrders(const Problem &p, double h, Multipliers lambda, bool others = 
       EXPECT_GE(o.q, k - .25);
       EXPECT_GE(o.v, k - .25);
       EXPECT_LT(o.q, k + 1.2);
-      /* alternating steps leave the error of a change of h in all multipliers */
+      /* with alternating steps the error of a change of h is in all multipliers */
       if (lambda == Multipliers::Judged) {
         EXPECT_GE(o.lambda, ratio > 1 ? k - 1.3 : k - .3);
       }
@@ -93,7 +94,7 @@ struct StateVectors {
   }
 };
 
-/* Largest error of dense output between steps, of q and of q' of coordinates, of q'', of multipliers */
+/* Largest errors of dense output between steps: of q, of q' of coordinates, of q'', of multipliers */
 std::array<double, 4> betweenSteps(const Problem &p, int k, double h)
 {
   Simulation            run(p, strict() + ofOrder(k));
@@ -154,7 +155,7 @@ TEST(HigherOrder, DenseOutput)
   }
 }
 
-/* Both ends of every step, among them those where the order changes */
+/* At both ends of every step, including those where the order changes, dense output has the values of the steps */
 TEST(HigherOrder, DenseOutputMeetsTheStep)
 {
   const UserVars p(1.);
@@ -182,7 +183,7 @@ TEST(HigherOrder, DenseOutputMeetsTheStep)
   EXPECT_GT(above(run.statistics()), 20);
 }
 
-/* Fewer steps for the same error, and the more so the smaller it is */
+/* Fewer steps for the same error than with order two, the more so the smaller the error */
 TEST(HigherOrder, FewerSteps)
 {
   const Pendulum p(-90., 0., 4.);
@@ -201,7 +202,8 @@ TEST(HigherOrder, FewerSteps)
   }
 }
 
-/* hω = 2 of an undamped mode that hardly moves: order 5 makes an oscillation of it, at constant steps without an end; the chosen order does not */
+/* hω = 2 for an undamped mode with almost no motion: with order 5 at constant steps its oscillation grows without
+   limit; the automatic order avoids this */
 TEST(HigherOrder, UndampedOscillationThatIsNotResolved)
 {
   const Oscillators p({1., 1000.}, {0., 0.}, false, 4.);
@@ -219,8 +221,8 @@ TEST(HigherOrder, UndampedOscillationThatIsNotResolved)
   }
 }
 
-/* Springs that hardly move, of all stiffnesses. For some of them order 5 makes an oscillation that holds the step, HHT does not: the chosen order must be no slower than
-   HHT alone. */
+/* Undamped springs of various stiffnesses with almost no motion. For some of them order 5 excites an oscillation that
+   limits the step, which HHT does not: the automatic order must not be slower than HHT alone */
 TEST(HigherOrder, StiffUndampedModeDoesNotHoldTheStep)
 {
   const char *const which[] = {"2", "5", "auto"};
@@ -240,7 +242,8 @@ TEST(HigherOrder, StiffUndampedModeDoesNotHoldTheStep)
   EXPECT_GT(held, 2.);
 }
 
-/* The first steps of order three, from those of HHT, whose velocities miss the differentiated constraints: multipliers keep an error of second order there */
+/* The first steps of order three follow steps of HHT, whose velocities violate the differentiated constraints: the
+   error of multipliers is of second order there, not lower */
 TEST(HigherOrder, MultipliersWhereTheOrderRises)
 {
   const Pendulum p(-60., 2., 1.);
@@ -260,10 +263,10 @@ TEST(HigherOrder, MultipliersWhereTheOrderRises)
 namespace
 {
 
-/* Once it has begun, its residual is not a number for an attempt, and for the next one with a new matrix */
+/* From t = 0.5 on the residual is NaN twice: in one attempt, and in its repetition with a new matrix */
 struct Hiccup : Pendulum {
   mutable int done = 0;
-  bool        begun = false; /* the start looks at times far ahead */
+  bool        begun = false; /* set after the first step, because the start evaluates the residual at much later times */
   Hiccup() : Pendulum(-60., 2., 1.) {}
   void residual(double t, const double *u, const double *v, const double *a, double *f) const override
   {
@@ -276,7 +279,8 @@ struct Hiccup : Pendulum {
 
 } // namespace
 
-/* A correction that fails is repeated with order two at the same h, whose a_n and misfit of velocities have to be made */
+/* A correction that fails is repeated with order two and the same h; for this a_n and the drift of velocities must be
+   computed */
 TEST(HigherOrder, MultipliersWhereTheOrderFalls)
 {
   double worst[2] = {0., 0.};
@@ -298,7 +302,7 @@ TEST(HigherOrder, MultipliersWhereTheOrderFalls)
   EXPECT_GE(order(worst[0], worst[1]), 1.8);
 }
 
-/* A step to an output time leaves no trace in those after it */
+/* A very short step, as to an output time, does not affect the accuracy of the steps after it */
 TEST(HigherOrder, StepFarShorterThanTheOthers)
 {
   const Pendulum p(-60., 0., 1.);
@@ -334,7 +338,7 @@ TEST(HigherOrder, RestartBeginsWithOrderTwo)
   EXPECT_LT(run.errors().q, 1e-3);
 }
 
-/* Every step twice; the second time it is the same but for what the corrector has learnt, and so are the orders */
+/* Every step is made twice; the second time it is the same except for what the corrector has learnt, and so are the orders */
 TEST(HigherOrder, RollBack)
 {
   const Pendulum p(-90., 0., 2.);
@@ -398,7 +402,7 @@ TEST(HigherOrder, CheckpointsRepeatTheRun)
   std::remove((file + ".info").c_str());
 }
 
-/* New Euler angles now and then, the past with them */
+/* New Euler angles from time to time; past values are transformed with them */
 TEST(HigherOrder, ChangesOfCoordinates)
 {
   const Tumbling p(true, 4.);
@@ -456,14 +460,14 @@ TEST(HigherOrder, SettersAndOptions)
     EXPECT_NE(run.step(), 0);
     EXPECT_TRUE(trap.says("-ts_hhtdae_form paper")) << trap.message;
   }
-  /* a reset goes back to order two for the next run */
+  /* after TSReset() the next run begins with order two */
   Simulation run(p, " -ts_hhtdae_order 4 ");
   must(run.solve());
   must(TSReset(run.ts));
   must(TSHHT3SetOrder(run.ts, 2));
 }
 
-/* Order 2 is HHT and nothing else, whatever the option says that it is */
+/* Order 2 is plain HHT, whether it is set by the option or by default */
 TEST(HigherOrder, OrderTwoIsTheDefault)
 {
   const FourBar p(2, .4);

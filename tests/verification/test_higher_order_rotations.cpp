@@ -15,10 +15,11 @@ namespace
 
 Matrix3 crossMatrix(const Vector3 &x) { return (Matrix3() << 0, -x(2), x(1), x(2), 0, -x(0), -x(1), x(0), 0).finished(); }
 
-/* About the joint or, without one, the centre of mass; in axes of the body, which at the start are those of space */
+/* A spinning body; vectors from the joint or, without a joint, from the centre of mass, in body axes, which coincide
+   with the space axes at the start */
 struct Spinning {
   double  mass;
-  Vector3 J, c, weight, spin; /* c: of the centre of mass from the joint; weight in space */
+  Vector3 J, c, weight, spin; /* c: centre of mass from the joint; weight: in space axes */
   double  end;
   bool    joint() const { return c.norm() > 0; }
 };
@@ -26,7 +27,7 @@ struct Spinning {
 const Spinning heavy_top{1, {0.265, 0.265, 0.02}, {0, 0, 0.5}, {0, -8, -6}, {0, 0, 30}, 0.8},
   tumbling_top{1, {0.1, 0.45, 0.55}, {0.5, 0, 0}, {0, 0, -9.81}, {0.4, 4, 0.4}, 1.2}, satellite{1, {1, 2, 3}, {0, 0, 0}, {0, 0, 0}, {0.1, 2, 0.1}, 4};
 
-/* Attitude, angular velocity and acceleration in space, force on the joint */
+/* Attitude, angular velocity, angular acceleration in space axes, force on the joint */
 struct Motion {
   Matrix3 A;
   Vector3 w, alpha, force;
@@ -55,7 +56,7 @@ public:
     }
     m.w     = m.A * W;
     m.alpha = m.A * dW;
-    m.force = b_.weight - b_.mass * (m.A * (dW.cross(b_.c) + W.cross(W.cross(b_.c)))); /* of the body on the ground */
+    m.force = b_.weight - b_.mass * (m.A * (dW.cross(b_.c) + W.cross(W.cross(b_.c)))); /* force of the body on the ground */
     return m;
   }
 
@@ -78,7 +79,7 @@ private:
   }
 };
 
-/* One body as a scene. Unknowns: position, rotation vector, multipliers. */
+/* The body as a scene. Unknowns: position, rotation vector, multipliers */
 struct Body1 {
   Scene    scene;
   Spinning b;
@@ -136,7 +137,7 @@ struct BodyRun {
     must(TSHHT3GetStatistics(run.ts, &s));
     return s;
   }
-  /* By dense output, which is the step's own at its end */
+  /* By dense output, which has the step's values at its end */
   void widenBy(Errors &worst, double t)
   {
     std::vector<double> x;
@@ -154,13 +155,13 @@ struct BodyRun {
   }
 };
 
-/* Largest errors in the second half, with steps h, ratio h, h, ...; at their ends or within them */
+/* Largest errors in the second half of the run, with steps h, ratio h, h, ...; at their ends or within them */
 Errors errorsAt(const Spinning &b, int k, double h, double ratio, bool within)
 {
   BodyRun r(b, fixedSteps(.01) + text(" -ts_hhtdae_order %d ", k));
   Errors  worst  = {};
   bool    longer = false;
-  for (double s = .001 * h; s < h; s *= 1.2) r.step(s); /* what the steps of order two leave there counts nothing */
+  for (double s = .001 * h; s < h; s *= 1.2) r.step(s); /* the errors of these steps of order two are negligible */
   while (r.t() < b.end - ratio * h) {
     const double begin = r.t(), step = longer ? ratio * h : h;
     longer = !longer;
@@ -191,7 +192,8 @@ TEST(HigherOrderRotations, ReferenceAgainstClosedForm)
   EXPECT_LT((exact.at(b.end).A - A).norm(), 1e-13);
 }
 
-/* Attitude, angular velocity and acceleration, multipliers, at constant steps and at h, 1.2 h, h, ...; there the change of h leaves its error in what is differentiated twice */
+/* Orders of attitude, angular velocity, angular acceleration and multipliers, at constant steps and at h, 1.2 h, h,
+   ...; in the latter case the change of h reduces the order of quantities that are differentiated twice */
 TEST(HigherOrderRotations, ObservedOrders)
 {
   for (const Case &c : cases)
@@ -217,12 +219,12 @@ TEST(HigherOrderRotations, DenseOutput)
   }
 }
 
-/* ---- several bodies, long runs, what stands in the way ---- */
+/* ---- several bodies, long runs, limits ---- */
 
 namespace
 {
 
-/* Rods on ball joints, the first of them spinning */
+/* Rods on ball joints; the first rod spins */
 struct SpatialChain {
   Scene scene{PETSC_COMM_SELF};
   SpatialChain()
@@ -265,7 +267,8 @@ TSHHT3Statistics statisticsOf(TS ts)
 
 } // namespace
 
-/* Past attitudes are in the file as they are in memory, about the reference that the file has too */
+/* Past attitudes are written to the checkpoint as they are in memory, relative to the reference attitude, which is
+   written as well */
 TEST(HigherOrderRotations, CheckpointsRepeatTheRun)
 {
   const TemporaryFile file("order_rotations"), info("order_rotations.info");
@@ -295,7 +298,7 @@ TEST(HigherOrderRotations, CheckpointsRepeatTheRun)
     }
 }
 
-/* Every step twice: past attitudes are not taken about another reference when a step is given back */
+/* Every step is made twice: when a step is rolled back, past attitudes must refer to the previous reference attitude again */
 TEST(HigherOrderRotations, RollBack)
 {
   SpatialChain chain;
@@ -313,7 +316,8 @@ TEST(HigherOrderRotations, RollBack)
   EXPECT_GT(statisticsOf(run.ts).of_order[5], 30);
 }
 
-/* What a rotation vector cannot tell is not differentiated: the order falls with the rotation in a step, and the attitude stays right. Steps of variable length keep the order. */
+/* Rotations too large for a rotation vector are not used as history: the order decreases with the rotation per step,
+   and the attitude stays right. With variable steps the order is kept */
 TEST(HigherOrderRotations, FastSpin)
 {
   const Spinning rotor{1, {1, 1, 1}, {0, 0, 0}, {0, 0, 0}, {0, 0, 100}, 1};
@@ -333,7 +337,8 @@ TEST(HigherOrderRotations, FastSpin)
     EXPECT_GT(r.statistics().of_order[c.order], 90) << c.turn;
     EXPECT_LT(worst[0], 1e-10) << c.turn;
   }
-  /* in steps of variable length the scene's limit of one radian a step decides, and none of them is lost to a higher order */
+  /* With variable steps the scene's limit of one radian per step determines h, and no step is rejected because of a
+     higher order */
   for (const char *which : {"2", "5", "auto"}) {
     BodyRun r({1, {1, 2, 2.01}, {0, 0, 0}, {0, 0, 0}, {100, 1e-3, 0}, 1}, tolerance(1e-5) + text(" -ts_hhtdae_order %s ", which));
     while (r.t() < 2) must(TSStep(r.run.ts));
@@ -344,7 +349,7 @@ TEST(HigherOrderRotations, FastSpin)
   }
 }
 
-/* Fewer steps for the same error */
+/* Fewer steps for the same error than with order two */
 TEST(HigherOrderRotations, FewerSteps)
 {
   double   error[2];

@@ -22,7 +22,7 @@ Matrix3 turn(const Vector3 &x)
 
 /* J W' + W x J W = c x R^T weight */
 struct Top {
-  Vector3 J, c, weight, spin; /* about the joint; centre of mass; in space; W at the start, where R = 1 */
+  Vector3 J, c, weight, spin; /* J: about the joint; c: centre of mass; weight: in space axes; spin: W at the start, where R = 1 */
   Vector3 rate(const Matrix3 &R, const Vector3 &W) const
   {
     const Vector3 moment = c.cross(R.transpose() * weight) - W.cross(J.asDiagonal() * W);
@@ -30,7 +30,7 @@ struct Top {
   }
 };
 
-/* HHT: (1 - af) W'_{n+1} + af W'_n = a_{n+1}, af = -alpha; W in axes of space or of the body */
+/* HHT: (1 - af) W'_{n+1} + af W'_n = a_{n+1}, af = -alpha; W in space axes or in body axes */
 struct LieGroup {
   const Top &top;
   double     h, af, beta, gamma;
@@ -41,12 +41,12 @@ struct LieGroup {
   LieGroup(const Top &t, double step, double alpha, bool in_space)
       : top(t), h(step), af(-alpha), beta((1 - alpha) * (1 - alpha) / 4), gamma(0.5 - alpha), space(in_space), W(t.spin), dW(rateOf(R, W))
   {
-    a = dW - af * h * (rateOf(turned(1e-6 * W), W + 1e-6 * dW) - dW) / 1e-6; /* which lags behind W' by af h */
+    a = dW - af * h * (rateOf(turned(1e-6 * W), W + 1e-6 * dW) - dW) / 1e-6; /* a is W' at a time af h earlier */
   }
   Vector3 rateOf(const Matrix3 &A, const Vector3 &w) const { return space ? Vector3(A * top.rate(A, A.transpose() * w)) : top.rate(A, w); }
   Matrix3 turned(const Vector3 &x) const { return space ? Matrix3(turn(x) * R) : Matrix3(R * turn(x)); }
   Vector3 inBody() const { return space ? Vector3(R.transpose() * W) : W; }
-  /* what is left of the equation of motion with a_{n+1} = x */
+  /* residual of the equation of motion with a_{n+1} = x */
   Vector3 residual(const Vector3 &x, Matrix3 &next, Vector3 &rate, Vector3 &acceleration) const
   {
     next         = turned(h * W + h * h * ((0.5 - beta) * a + beta * x));
@@ -77,7 +77,7 @@ struct LieGroup {
   }
 };
 
-/* R by rows, then W */
+/* Extrapolated solution: R by rows, then W */
 class Exact
 {
 public:
@@ -114,7 +114,7 @@ private:
   }
 };
 
-/* sn, cn, dn of parameter m by the arithmetic-geometric mean */
+/* sn, cn, dn of the parameter m by the arithmetic-geometric mean */
 void jacobiElliptic(double u, double m, double *sn, double *cn, double *dn)
 {
   double a[12] = {1}, c[12] = {std::sqrt(m)}, b = std::sqrt(1 - m);
@@ -134,7 +134,8 @@ void jacobiElliptic(double u, double m, double *sn, double *cn, double *dn)
   *dn = *cn / std::cos(before - phi);
 }
 
-/* Largest error of where the centre of mass, or the first axis if that rests, is at 20 times up to the end */
+/* Largest error of the position of the centre of mass (or of a point on the first axis, if the centre of mass is at
+   rest) at 20 times up to the end */
 double errorOfReference(const Top &top, Exact &exact, const Vector3 &point, double end, double h, double alpha, bool space)
 {
   LieGroup   m(top, h, alpha, space);
@@ -155,7 +156,7 @@ double errorOfScene(const Top &top, double mass, Exact &exact, const Vector3 &po
   scene.gravity(top.weight / mass);
   scene.start().rotations = rotations;
   b.mass                  = mass;
-  b.inertia               = Matrix3(top.J.asDiagonal()) + mass * skew(top.c) * skew(top.c); /* about the centre of mass */
+  b.inertia               = Matrix3(top.J.asDiagonal()) + mass * skew(top.c) * skew(top.c); /* from the joint to the centre of mass (parallel axes) */
   b.center                = top.c;
   b.angular_velocity      = top.spin;
   b.velocity              = top.spin.cross(top.c);
@@ -198,14 +199,14 @@ TEST(LieGroup, ReferenceAgainstEllipticFunctions)
   }
 }
 
-/* Lagrange's top in regular precession: the reference method, and the extrapolation */
+/* Lagrange's top in regular precession, for the reference method and for the extrapolation */
 TEST(LieGroup, ReferenceAgainstRegularPrecession)
 {
   const double  l = 0.5, I3 = 0.02, I1 = 0.265, spin = 120, theta = PETSC_PI / 3, g = 9.81, cos = std::cos(theta), end = 2;
   const double  rate = 2 * g * l / (I3 * spin + std::sqrt(I3 * spin * I3 * spin - 4 * I1 * cos * g * l));
-  const Matrix3 tilt = turn({theta, 0, 0}); /* body axes at the start are those of space: the tilted axis is c */
+  const Matrix3 tilt = turn({theta, 0, 0}); /* at the start body axes coincide with space axes, and c is along the tilted axis */
   const Vector3 axis = tilt.col(2), up = Vector3::UnitZ();
-  /* moments about e1, e2 of the tilted frame: inertia I1 across the axis, I3 along */
+  /* moments about e1, e2 of the tilted frame: I1 across the axis, I3 along it */
   const Matrix3 toTop = tilt.transpose();
   const Top     top{{I1, I1, I3}, {0, 0, l}, toTop * (-g * up), toTop * (rate * up + (spin - rate * cos) * axis)};
   Exact         extrapolated(top, 0.1 / spin);
@@ -224,9 +225,10 @@ TEST(LieGroup, ReferenceAgainstRegularPrecession)
   }
 }
 
-/* The scene, with absolute coordinates and multipliers, is as accurate at the same steps as the reference in axes of space, or better; Euler
-   angles are not. Velocities in axes of the body lose what spins about an axis that hardly moves, and gain a factor of up to 10 where a body tumbles: there
-   the bounds say how far the scene is behind. */
+/* With the same steps the scene, with absolute coordinates and multipliers, is at least as accurate as the reference
+   method in space axes; with Euler angles it is not. Velocities in body axes are worse for a fast spin about an axis
+   that hardly moves, and better by a factor of up to 10 for a tumbling body: there the bounds state how much less
+   accurate the scene is */
 TEST(LieGroup, ErrorsOfScenesAtTheSameSteps)
 {
   const double g = 9.81;
@@ -234,7 +236,7 @@ TEST(LieGroup, ErrorsOfScenesAtTheSameSteps)
     const char *name;
     double      mass;
     Top         top;
-    double      end, h, allowed, of_body; /* of the errors of the reference in axes of space and of the body */
+    double      end, h, allowed, of_body; /* error allowed relative to the reference method in space axes, and in body axes */
   } const cases[] = {
       {"heavy top", 15, {{0.234375 + 15, 0.46875, 0.234375 + 15}, {0, 1, 0}, {0, 0, -15 * g}, {0, 150, -4.61538}}, 2, 5e-4, 1. / 300, 1. / 300}, /* without the second term of Magnus' series 1/70 */
       {"tumbling top", 1, {{0.1, 0.45, 0.55}, {0.5, 0, 0}, {0, 0, -g}, {0.4, 4, 0.4}}, 4, 2e-3, 1.2, 6},

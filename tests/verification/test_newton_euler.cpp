@@ -1,5 +1,5 @@
-/* The laws of Newton and Euler for every body, from channels alone: each type of joint, motion and force, and the
- * examples' scenes */
+/* The laws of Newton and Euler for every body, computed from channels only: each type of joint, motion and force, and
+   the scenes of the examples */
 #include "balance_scenes.h"
 #include "bricard_model.h"
 #include "chain_model.h"
@@ -20,21 +20,21 @@ namespace
 
 const std::string sharp = tolerance(1e-6) + " -ts_hhtdae_corrector_tolerance 1e-9 ";
 
-/* What a run leaves: the worst balance of all ends of steps, the work of all loads by the trapezoidal rule over the
- * steps, energies */
+/* Result of a run: the worst balance at all ends of steps, the work of all loads by the trapezoidal rule over the
+   steps, changes of the energies */
 struct Judged {
   Imbalance           worst;
-  double              at    = 0; /* time of the worst */
+  double              at    = 0; /* time of the worst balance */
   int                 steps = 0;
   Powers              work;
-  double              kinetic = 0, potential = 0; /* what they have grown by */
+  double              kinetic = 0, potential = 0; /* changes since the start */
   std::vector<double> acted;                      /* largest load of each element */
 };
 
 struct Watcher {
   Scene              &scene;
   NewtonEuler        &laws;
-  int                 kinetic, potential; /* channels */
+  int                 kinetic, potential; /* indices of channels */
   Judged              result;
   double              t = 0;
   Powers              before;
@@ -89,11 +89,11 @@ Judged judge(Scene &scene, const Specs &specs, double end, const std::string &op
   SceneRun  run(scene, end, options);
   must(TSMonitorSet(run.ts, Watch, &w, nullptr));
   must(run.solve());
-  EXPECT_GT(w.result.steps, 1); /* a ball that rolls evenly needs two */
+  EXPECT_GT(w.result.steps, 1); /* a ball that rolls uniformly needs two steps */
   return w.result;
 }
 
-/* Every body is in balance; all loads together do the work that the kinetic energy grows by; joints do none */
+/* Every body is in balance; the work of all loads together is the increase of kinetic energy; joints do no work */
 Judged balances(const std::string &name, Scene &scene, const Specs &specs, double end)
 {
   SCOPED_TRACE(name);
@@ -124,7 +124,7 @@ void balance(const std::vector<BalanceCase> &cases)
 TEST(NewtonEuler, OfBodiesOnEveryJoint) { balance(JointCases()); }
 TEST(NewtonEuler, OfBodiesUnderEveryForce) { balance(ForceCases()); }
 
-/* What the potential energy loses is the work of its forces */
+/* The decrease of potential energy is the work of its forces */
 TEST(NewtonEuler, WorkIsWhatThePotentialLoses)
 {
   for (const BalanceCase &c : PotentialCases()) {
@@ -147,7 +147,7 @@ TEST(NewtonEuler, OfTheExamples)
   look("bricard", bricard.scene, 1);
   for (bool spherical : {false, true}) {
     Scene chain(PETSC_COMM_SELF), net(PETSC_COMM_SELF);
-    chain.gravity({1, -9.81, 2}); /* a chain that moves in space; hinges turn about z */
+    chain.gravity({1, -9.81, 2}); /* out of the plane too, so that the chain moves in space; hinges rotate about z */
     net.gravity({2, -9.81, 3});
     hhtex::AddChain(chain, 5, spherical);
     look(spherical ? "chain of balls" : "chain of hinges", chain, 0.5);
@@ -173,8 +173,8 @@ TEST(NewtonEuler, OfTheExamples)
   look("slider-crank", crank.scene, 1);
 }
 
-/* Of a flexible body no channel shows the inertia: what is judged are crank and slider, and that the frames of its
-   attachments, which have no mass, hand all forces on to it */
+/* No channel shows the inertia of a flexible body. The crank and the slider are judged, and that the massless frames
+   of attachments transmit all forces to the flexible body */
 TEST(NewtonEuler, OfAFlexibleCrank)
 {
   hhtex::FlexCrank crank(ModalMass::Full, PETSC_COMM_SELF);

@@ -1,4 +1,4 @@
-/* Observed order of convergence at fixed steps: errors over the run for h and h/2 */
+/* Observed order of convergence at fixed steps, from the errors over the run for h and h/2 */
 #include "support.h"
 
 using namespace hhtest;
@@ -41,7 +41,7 @@ void expectSecondOrder(const Problem &p, const Setting &s, int steps, bool lambd
   const Orders o = measure(p, s, steps);
   EXPECT_GE(o.q, 1.95);
   EXPECT_GE(o.v, 1.95);
-  EXPECT_LT(o.q, 3.5); /* a larger one would mean that errors are not what they are taken for */
+  EXPECT_LT(o.q, 3.5); /* a higher order would mean that the measured errors are not those of the method */
   if (lambda) {
     EXPECT_GE(o.lambda, 1.9);
   }
@@ -114,7 +114,7 @@ TEST(Order, PaperFormIsOfFirstOrderForVariableMass)
   }
 }
 
-/* Steps of changing length keep the order: alternately h and 2h, set from outside */
+/* With steps of alternating length, h and 2h set by the user, the order is kept */
 TEST(Order, ChangingSteps)
 {
   const Pendulum pendulum(-90., 0., 1.5);

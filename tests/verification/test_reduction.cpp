@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 namespace
 {
 
-/* ---- models of another program: node lines of an Abaqus deck, matrices as rows i j v ---- */
+/* ---- models of another program: node lines of an Abaqus deck, matrices in rows i j v ---- */
 
 std::string reference(const std::string &file)
 {
@@ -79,7 +79,7 @@ void expectFrequencies(const ReducedBody &body, const std::vector<double> &publi
     residual = std::max(residual, body.mode[k].residual);
   }
   MEASURED("%d frequencies: off by %.1e at most, residuals up to %.1e", (int)published.size(), off, residual);
-  EXPECT_LT(off, 2e-6); /* as many digits as are given */
+  EXPECT_LT(off, 2e-6); /* as many digits as the reference has */
   EXPECT_LT(residual, 1e-6);
 }
 
@@ -101,8 +101,8 @@ VectorXd frequencies(const MatrixXd &K, const MatrixXd &M)
   return l.cwiseMax(0).cwiseSqrt() / (2 * PETSC_PI);
 }
 
-/* The tied model in dense form: dofs that no rigid attachment holds, then six for each of these attachments; Q takes
-   the motion of all attachments out of them */
+/* The tied model in dense form: degrees of freedom not in a rigid attachment, then six for each rigid attachment; Q
+   removes the motion of all attachments */
 struct Dense {
   MatrixXd P, K, M, Q, R;
   Dense(const FeModel &model, const Reduction &reduction, const ReducedBody &body)
@@ -132,7 +132,7 @@ struct Dense {
         average(model, reduction.attachments[a], body.modal.attachments[a].position, a);
     K = P.transpose() * dense(model.K) * P;
     M = P.transpose() * dense(model.M) * P;
-    /* rigid motions, orthonormal in M */
+    /* rigid-body motions, orthonormal in M */
     MatrixXd u(n, 6);
     for (PetscInt i = 0; i < model.nodes; i++)
       u.middleRows(3 * i, 3) = RigidMotion(NodePosition(model, i), body.modal.center);
@@ -140,7 +140,7 @@ struct Dense {
     const MatrixXd mR = R.transpose() * M * R;
     R                 = (R * hhtest::ModesOf(MatrixXd::Identity(6, 6), mR).vectors).eval();
   }
-  /* least squares by the normal equations */
+  /* averaging attachment by least squares (normal equations) */
   void average(const FeModel &model, const Attachment &a, const Vector3 &position, std::size_t row)
   {
     const std::vector<PetscInt> &set = model.sets.at(a.name);
@@ -154,7 +154,7 @@ struct Dense {
     Q.middleRows(6 * row, 6) =
         hhtest::SolveDense(A.transpose() * w.asDiagonal() * A, A.transpose() * w.asDiagonal() * S) * P;
   }
-  /* Elastic displacements, orthogonal to rigid motions in M, under forces that are in equilibrium */
+  /* Elastic displacements, orthogonal to rigid-body motions in M, under self-equilibrated forces */
   MatrixXd solve(const MatrixXd &f) const
   {
     const MatrixXd MR = M * R;
@@ -200,8 +200,8 @@ TEST(Exudyn, BlockUnsupported)
   expectFrequencies(body, {438.775, 438.775, 555.888, 967.040, 967.040, 1028.046});
 }
 
-/* Clamped at x = 0: the coordinates of a body with this attachment, its motion held to zero. The modes with the
-   interface held span that space, so the frequencies are those of the full model. */
+/* Clamped at x = 0: a body with this attachment, whose six coordinates are fixed. The fixed-interface modes span the
+   remaining space, so that the frequencies are those of the full model */
 TEST(Exudyn, BlockClamped)
 {
   FeModel model(PETSC_COMM_SELF);
@@ -248,7 +248,7 @@ TEST(Exudyn, RotorUnsupported)
 
 /* ---- the full model ---- */
 
-/* Free frequencies of the body with its attachments, by Craig-Bampton and by the full (tied) model in dense algebra:
+/* Free frequencies of the body with its attachments, by Craig-Bampton and by the full (tied) model with dense algebra;
    normal modes up to two and a half times the cut-off */
 TEST(ReducedFrequencies, AgreeWithTheFullModel)
 {
@@ -300,7 +300,7 @@ TEST(ReducedFrequencies, FreeModesAreThoseOfTheTiedModel)
   }
 }
 
-/* Static condensation by dense algebra has the same frequencies */
+/* Guyan reduction has the frequencies of static condensation by dense algebra */
 TEST(ReducedFrequencies, GuyanIsStaticCondensation)
 {
   FeModel     model(PETSC_COMM_SELF);
@@ -319,7 +319,7 @@ TEST(ReducedFrequencies, GuyanIsStaticCondensation)
 
 /* ---- static exactness ---- */
 
-/* Wrenches in equilibrium at the attachments move these as in the full model, with any number of normal modes */
+/* Self-equilibrated wrenches at the attachments displace these as in the full model, with any number of normal modes */
 TEST(ReducedStatics, WrenchesBetweenAttachments)
 {
   const struct {
@@ -342,7 +342,7 @@ TEST(ReducedStatics, WrenchesBetweenAttachments)
     const ModalAttachment &a = body.modal.attachments[0], &b = body.modal.attachments[1];
     MatrixXd               G(12, body.modal.modes()), F(12, 6);
     G << a.translation, a.rotation, b.translation, b.rotation;
-    /* unit wrenches at b, the reaction at a */
+    /* unit wrenches at b, and their reactions at a */
     F.bottomRows<6>().setIdentity();
     for (int k = 0; k < 6; k++) {
       Vector3 force = Vector3::Zero(), torque = Vector3::Zero();

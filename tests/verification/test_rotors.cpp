@@ -15,7 +15,7 @@ namespace
 
 Matrix3 about(const Vector3 &axis, double angle) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
 
-/* How two runs with steps h and h/2 differ from what is exact, at 20 times */
+/* Differences between two runs with steps h and h/2 and the exact solution, at 20 times */
 struct Errors {
   double error[2];
   double order() const { return std::log2(error[0] / error[1]); }
@@ -28,7 +28,7 @@ struct Errors {
     D psi' + C w c = p,  D = Jo + (Iy + A) s^2 + Iz c^2,      (Ix + A) theta'' = psi'^2 s c (Iy + A - Iz) - C w psi' s + m g l s
 */
 struct Gyroscope {
-  const double Jo = 0.02, I[3] = {0.01, 0.012, 0.006}, mass = 0.5, l = 0.06, A = 0.008, C = 0.015, g = 9.81; /* the inner ring about its centre of mass */
+  const double Jo = 0.02, I[3] = {0.01, 0.012, 0.006}, mass = 0.5, l = 0.06, A = 0.008, C = 0.015, g = 9.81; /* of the inner ring, about its centre of mass */
   const double theta = 1, yaw = -0.5, spin = 60;
   const double Ix = I[0] + mass * l * l, Iy = I[1] + mass * l * l, Iz = I[2];
   const double w = spin + yaw * std::cos(theta);
@@ -44,7 +44,7 @@ struct Gyroscope {
     f[2]                  = w - psi * c;
     f[3]                  = (psi * psi * s * c * (Iy + A - Iz) - C * w * psi * s + mass * g * l * s) / (Ix + A);
   }
-  /* a point of the rotor's rim */
+  /* Position of a point on the rotor's rim */
   Vector3 rim(double t)
   {
     const auto y = motion.at(t);
@@ -162,10 +162,10 @@ TEST(Rotors, GyroscopeInACage)
   MEASURED("errors of a point of the rim, h = 1e-3 and half of it: %.2e, %.2e m, Euler angles %.2e, %.2e", local.error[0], local.error[1], euler.error[0], euler.error[1]);
   EXPECT_NEAR(local.order(), 2, 0.1);
   EXPECT_LT(local.error[1], 1e-5);
-  EXPECT_LT(local.error[1], 1.5 * euler.error[1]); /* whose angles are those of the cage's hinges here */
+  EXPECT_LT(local.error[1], 1.5 * euler.error[1]); /* whose Euler angles are here the angles of the cage's hinges */
 }
 
-/* Below the second critical speed and above the first one */
+/* Speed between the first and the second critical speed */
 TEST(Rotors, UnbalanceOnAFlexibleShaft)
 {
   for (double speed : {40., 300.}) {

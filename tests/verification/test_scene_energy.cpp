@@ -1,4 +1,4 @@
-/* Energy and momentum of scenes, as their channels and -scene_balance give them */
+/* Energy and momentum of scenes, from their channels and from -scene_balance */
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -19,11 +19,12 @@ double Figure(const std::string &text, const std::string &key)
   return std::stod(text.substr(at + key.size() + 2));
 }
 
-const std::string conserving = " -ts_hhtdae_alpha -0.02 "; /* little damping; none at all is weakly unstable with constraints */
+const std::string conserving = " -ts_hhtdae_alpha -0.02 "; /* little damping; without any the method is weakly unstable with constraints */
 
 } // namespace
 
-/* A double pendulum: kinetic and potential energy exchange some 10 J, and the sum goes to its start with the tolerance */
+/* A double pendulum: kinetic and potential energy exchange about 10 J, and the error of their sum decreases with the
+   tolerance */
 TEST(SceneEnergy, OfADoublePendulum)
 {
   double before = 1e300;
@@ -46,7 +47,7 @@ TEST(SceneEnergy, OfADoublePendulum)
     EXPECT_LT(Spread(E), eps == 1e-5 ? 0.1 : 0.005);
     EXPECT_LT(Spread(E), before);
     before = Spread(E);
-    /* the sheet says the same of the ends of steps */
+    /* the file of -scene_balance has the same values at the ends of steps */
     const CSV balance(sheet.text());
     EXPECT_GT(balance.row.size(), 100u);
     EXPECT_NEAR(std::abs(Figure(printed.text(), "drift")), Spread(balance.column("total")), 2 * Spread(E));
@@ -55,7 +56,8 @@ TEST(SceneEnergy, OfADoublePendulum)
   }
 }
 
-/* Two tumbling bodies and a spring between them, in free flight without gravity: momentum, angular momentum and energy stay */
+/* Two tumbling bodies connected by a spring, in free flight without gravity: momentum, angular momentum and energy are
+   conserved */
 TEST(SceneEnergy, OfBodiesThatTumbleOnASpring)
 {
   TemporaryFile sheet("tumble.csv");
@@ -92,7 +94,7 @@ TEST(SceneEnergy, OfBodiesThatTumbleOnASpring)
            Spread(balance.column("kinetic")), Spread(balance.column("Lz")));
 }
 
-/* A damper takes from the total, and nothing is said to be lost without it */
+/* A damper decreases the total energy; without it no loss is reported */
 TEST(SceneEnergy, ADamperTakesEnergy)
 {
   TemporaryFile sheet("damper.csv");

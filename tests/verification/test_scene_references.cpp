@@ -1,4 +1,4 @@
-/* Scenes of the benchmark mechanisms, short runs: exact values, published digits, and equations in fewer coordinates */
+/* Scenes of the benchmark mechanisms in short runs: exact solutions, published digits, and equations in fewer coordinates */
 #include "hhtdae/scene.h"
 #include "problems/fourbar.h"
 #include "scene_output.h"
@@ -11,7 +11,7 @@ using hhtex::Widen;
 namespace
 {
 
-/* A scene that runs, its channels looked at every dt */
+/* A run of a scene whose channels are read at intervals dt */
 class Watched
 {
 public:
@@ -31,18 +31,18 @@ private:
   hhtex::Watch watch_;
 };
 
-/* Error at two tolerances: the second within the bound, and better than the first by what second order promises */
+/* Errors at two tolerances: the second is within the bound, and smaller than the first as a method of second order requires */
 void converges(const char *what, const std::function<double(double)> &error, double loose, double tight, double bound)
 {
   const double a = error(loose), b = error(tight);
   MEASURED("%s: error %.2e at tolerance %g, %.2e at %g", what, a, loose, b, tight);
   EXPECT_LT(b, bound) << what;
-  EXPECT_LT(b, a * std::pow(tight / loose, 0.5)) << what; /* h goes with the cube root, the error with its square */
+  EXPECT_LT(b, a * std::pow(tight / loose, 0.5)) << what; /* h is proportional to the cube root of the tolerance, the error to its square */
 }
 
 std::string damped(double eps) { return tolerance(eps) + " -ts_hhtdae_alpha -0.05 "; }
 
-/* Where multipliers count: what the corrector leaves in q goes into them over h^2 */
+/* For tests of multipliers: the error that the corrector leaves in q enters the multipliers divided by h^2 */
 std::string sharp(double eps) { return tolerance(eps) + " -ts_hhtdae_corrector_tolerance 1e-6 "; }
 
 Matrix3 axes(const Vector3 &x, const Vector3 &z)
@@ -74,7 +74,7 @@ void look(Scene &scene, const Measure &m)
 
 } // namespace
 
-/* A01: a point on a rod without mass, released level; exact in Jacobi's elliptic functions */
+/* A01: a point on a massless rod, released from the horizontal; exact solution by Jacobi's elliptic functions */
 TEST(SceneReferences, Pendulum)
 {
   converges(
@@ -103,7 +103,8 @@ TEST(SceneReferences, Pendulum)
       1e-6, 1e-8, 1e-4);
 }
 
-/* A02: uprights and couplers of 1 m, released upright; exact in elliptic integrals. In space its constraints are redundant. */
+/* A02: uprights and couplers of 1 m, released upright; exact solution by elliptic integrals. In space the constraints
+   are redundant */
 static double fourBars(Space space, const std::string &options, int windows = 2, double end = 1)
 {
   const hhtex::FourBar exact(windows, end);
@@ -142,11 +143,12 @@ TEST(SceneReferences, FourBars)
   converges(
       "A02 four-bars in the plane, tip at t = 1", [](double eps) { return fourBars(Space::Planar, damped(eps)); }, 1e-6, 1e-8,
       2e-4);
-  Printed quiet; /* of the redundant rows that are dropped */
+  Printed quiet; /* messages about redundant rows that are dropped */
   EXPECT_LT(fourBars(Space::Spatial, damped(1e-7)), 1e-3);
 }
 
-/* Ten times through the flat position, where Phi_q loses rank: the error falls with h^2, and a tolerance near rounding is met */
+/* The mechanism passes the flat position, where Phi_q loses rank, ten times: the error decreases with h^2, also at
+   tolerances near rounding */
 TEST(SceneReferences, FourBarsWithManyLoops)
 {
   for (int windows : {1, 10}) {
@@ -163,7 +165,7 @@ TEST(SceneReferences, FourBarsWithManyLoops)
   }
 }
 
-/* Spatial slider-crank against the equation in the crank's angle */
+/* Spatial slider-crank against the equation of motion in terms of the crank's angle */
 TEST(SceneReferences, SliderCrank)
 {
   converges(
@@ -200,7 +202,7 @@ TEST(SceneReferences, SliderCrank)
       1e-6, 1e-8, 5e-5);
 }
 
-/* A04: closure and energy as well, with the row that is redundant left out by the scene */
+/* A04: also closure of the loop and energy, with the redundant row dropped by the scene */
 TEST(SceneReferences, Bricard)
 {
   using Reference    = hhtex::BricardReference;
@@ -251,7 +253,7 @@ TEST(SceneReferences, Bricard)
 /* A05 for a second */
 TEST(SceneReferences, Flyball)
 {
-  hhtex::FlyballReference exact; /* its stiffness makes it costly: once */
+  hhtex::FlyballReference exact; /* expensive because of its stiffness, hence computed once */
   converges(
       "A05 governor, slider and tip to t = 1",
       [&](double eps) {
@@ -273,7 +275,7 @@ TEST(SceneReferences, Flyball)
         scene.add("bearing", Revolute{axis, scene.marker(scene.ground(), 0.5 * ez)});
         scene.add("guide", Translational{scene.marker(Z), axis});
         for (double side : {1., -1.}) {
-          /* rod and mass at its end as one body about a hinge: centre at (0.15 + 5)/5.3 of the rod */
+          /* rod and end mass as one body on a hinge: the centre of mass is at (0.15 + 5)/5.3 of the rod */
           const Vector3 hinge(0.05 * side, 0, 1), out(std::cos(M_PI / 6) * side, 0, -0.5);
           const double  c = 5.15 / 5.3, across = 0.025 * 1.0001 + 0.3 * (c - 0.5) * (c - 0.5) + 5 * (1 - c) * (1 - c);
           RigidBody     arm    = rod(5.3, 0.025 * 2e-4, across, hinge, hinge + out, ey);
@@ -295,14 +297,14 @@ TEST(SceneReferences, Flyball)
           Widen(error, (Vector3(-v[3], -v[4], v[5]) - tip).norm());
           Widen(error, v[6], y.s);
         });
-        EXPECT_LT(run.s.steps, 2000); /* steps are not those of the stiffness, 1/27000 s */
+        EXPECT_LT(run.s.steps, 2000); /* the steps do not follow the stiffness, whose time scale is 1/27000 s */
         return error;
       },
       1e-6, 1e-8, 5e-5);
 }
 
-/* The heavy top of Bruels and Cardona to its first table time, reaction included; steps of one length, as every change
-   of the step shakes the multipliers */
+/* The heavy top of Bruels and Cardona up to its first table time, including the reaction; with constant steps, since
+   every change of the step excites the multipliers */
 TEST(SceneReferences, HeavyTop)
 {
   const Vector3 x(.60555056137707, .59895768179494, -.52398302743003), Om(-2.6915909121430, 150, 4.9172609898946),
@@ -342,7 +344,8 @@ TEST(SceneReferences, HeavyTop)
   }
 }
 
-/* A body tumbles about its middle axis on a ball joint: Euler angles get new axes again and again, no steps lost by it */
+/* A body tumbles about its middle axis on a ball joint: Euler angles are referred to new axes repeatedly, without loss
+   of steps */
 TEST(SceneReferences, Tumbling)
 {
   for (Rotations rotations : {Rotations::Local, Rotations::Euler313}) {
@@ -372,7 +375,8 @@ TEST(SceneReferences, Tumbling)
   }
 }
 
-/* A ball down a slope: 5/7 g sin, friction 2/7 m g sin, normal force m g cos. About an axis that stays, a local rotation vector has no error. */
+/* A ball rolls down a slope: 5/7 g sin, friction 2/7 m g sin, normal force m g cos. For rotation about a fixed axis a
+   local rotation vector has no error */
 TEST(SceneReferences, RollingBall)
 {
   const auto error = [](double eps, Rotations rotations) {
@@ -403,7 +407,7 @@ TEST(SceneReferences, RollingBall)
   EXPECT_LT(error(1e-6, Rotations::Local), 1e-6);
 }
 
-/* Quarter car over a curb: the tire leaves the road and comes down again */
+/* A quarter car passes a curb: the tire loses contact and regains it */
 TEST(SceneReferences, QuarterCar)
 {
   hhtex::QuarterCarReference::Parameters p;

@@ -43,7 +43,7 @@ Array run(Scene &s, double t, const std::string &options, Array *rates = nullptr
 
 } // namespace
 
-/* ---- misfits ---- */
+/* ---- violated constraints ---- */
 
 TEST(SceneAssembly, AMisfitIsAnErrorThatNamesTheJoint)
 {
@@ -61,10 +61,10 @@ TEST(SceneAssembly, ASmallMisfitPasses)
   const Body arm = s.add("arm", rod({0, 0, 0}, {1, 0, 0}));
   s.add("hinge", hhtdae::Revolute{s.marker(arm, {-0.5 + 1e-8, 0, 0}), s.marker(s.ground())});
   EXPECT_EQ(complaint(s), "");
-  EXPECT_NEAR(DataOf(s).started.misfit, 2e-8, 1e-10); /* of the size, half a metre */
+  EXPECT_NEAR(DataOf(s).started.misfit, 2e-8, 1e-10); /* relative to the size of the model, half a metre */
 }
 
-/* Neither what hangs by nothing nor a marker that only measures makes a gap smaller */
+/* Neither unconnected bodies nor markers used only for measuring, far away, make a gap relatively smaller */
 TEST(SceneAssembly, FarMarkersAndBodies)
 {
   for (int other = 0; other < 4; other++) {
@@ -92,7 +92,7 @@ TEST(SceneAssembly, VelocitiesAreHeldAgainstTheConstraints)
 {
   Scene     s(PETSC_COMM_SELF);
   RigidBody b    = rod({0, 0, 0}, {1, 0, 0});
-  b.velocity     = {0, 1, 0}; /* a rod that turns about its end turns with 2 */
+  b.velocity     = {0, 1, 0}; /* a rod that rotates about its end with 2 rad/s */
   const Body arm = s.add("arm", b);
   pin(s, "hinge", arm, s.ground(), {0, 0, 0});
   SAYS(complaint(s), "revolute hinge: velocities violate it by 1");
@@ -111,7 +111,7 @@ TEST(SceneAssembly, TheSmallestChangeInTheMetricOfTheMasses)
   ASSERT_EQ(s.setUp(), 0);
   EXPECT_NEAR(body(s, a).r(0), 0.3, 1e-12);
   EXPECT_NEAR(body(s, b).r(0), 1.3, 1e-12);
-  EXPECT_NEAR(body(s, a).v(0), 3, 1e-9); /* momentum stays: (0 + 3 * 4) / 4 */
+  EXPECT_NEAR(body(s, a).v(0), 3, 1e-9); /* momentum is conserved: (0 + 3 * 4) / 4 */
   EXPECT_NEAR(body(s, b).v(0), 3, 1e-9);
   EXPECT_NEAR(body(s, b).v(1), 1, 1e-12);
 }
@@ -130,7 +130,8 @@ TEST(SceneAssembly, AFixedStartStays)
   EXPECT_NEAR(body(s, b).v(0), 0, 1e-9);
 }
 
-/* Crank held, the rest thrown about: positions by intersection of circles, angular velocities by the loop equation */
+/* The crank is fixed, the other bodies are displaced: positions by intersection of circles, angular velocities by the
+   loop equation */
 TEST(SceneAssembly, AWronglyGivenFourBar)
 {
   for (Space space : {Space::Planar, Space::Spatial}) {
@@ -223,7 +224,8 @@ TEST(SceneAssembly, ContradictingMotions)
   SAYS(text, "rotational motion slow");
 }
 
-/* A constant velocity joint has no direction in which it comes nearer where its shafts, free to turn, are described a quarter turn apart */
+/* Shafts of a constant-velocity joint that are described a quarter turn apart: there the gradient of the constraint
+   violation gives no direction in which to turn them */
 TEST(SceneAssembly, AQuarterTurnOff)
 {
   for (double more : {0., 1e-9}) {
@@ -233,7 +235,7 @@ TEST(SceneAssembly, AQuarterTurnOff)
     shaft.position      = {0, 0, -0.5};
     const Body a        = s.add("a", shaft);
     shaft.position      = {0, 0, 0.5};
-    shaft.rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1; /* exactly, as the cosine of M_PI / 2 is not */
+    shaft.rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1; /* exactly, whereas cos(M_PI / 2) is not zero */
     shaft.rotation = shaft.rotation * Eigen::AngleAxisd(more, Vector3::UnitZ()).toRotationMatrix();
     const Body b        = s.add("b", shaft);
     s.add("ja", hhtdae::Revolute{s.marker(a), s.marker(s.ground(), {0, 0, -0.5})});
@@ -243,7 +245,7 @@ TEST(SceneAssembly, AQuarterTurnOff)
     Printed quiet;
     EXPECT_EQ(s.setUp(), 0) << more;
     EXPECT_LT(DataOf(s).started.misfit, 1e-9);
-    EXPECT_NEAR(DataOf(s).started.turned, M_PI / 4, 0.1); /* half of it each */
+    EXPECT_NEAR(DataOf(s).started.turned, M_PI / 4, 0.1); /* each shaft turns by half of it */
   }
 }
 
@@ -283,7 +285,8 @@ TEST(SceneRedundant, APlanarFourBarOfSpatialHinges)
   MEASURED("%s", printed.text().c_str());
 }
 
-/* One hinge that is out of line by less than what is written down of a direction locks nothing: its rows are dropped, or an error says that it does */
+/* One hinge is misaligned by less than the precision with which a direction is usually given. Either its redundant
+   rows are dropped and the mechanism moves, or an error says that it is locked */
 TEST(SceneRedundant, AHingeSlightlyOutOfLine)
 {
   for (double tilt : {0., 1e-10, 1e-9, 3e-9, 1e-8, 3e-8, 1e-7, 3e-7, 6e-7}) {
@@ -303,7 +306,7 @@ TEST(SceneRedundant, AHingeSlightlyOutOfLine)
   }
 }
 
-/* A small mechanism far from the origin has all of its constraints */
+/* A small mechanism far from the origin keeps all of its constraints */
 TEST(SceneRedundant, FarFromTheOrigin)
 {
   Scene         s(PETSC_COMM_SELF);
@@ -320,7 +323,7 @@ TEST(SceneRedundant, FarFromTheOrigin)
   EXPECT_EQ(DataOf(s).started.redundant, 0);
 }
 
-/* Dropping rows leaves the motion as it is: the same as that of the planar scene, which has none to drop */
+/* Dropping redundant rows does not change the motion: it is that of the planar scene, which has none */
 TEST(SceneRedundant, TheMotionIsThatOfTheMinimalMechanism)
 {
   const std::string options = "-ts_rtol 1e-7 -ts_atol 1e-7";
@@ -346,7 +349,7 @@ TEST(SceneRedundant, Bricard)
   bricard(s);
   Printed     printed;
   Array       v;
-  s.start().rotations = hhtdae::Rotations::Euler313; /* which are whole in the state that is read below */
+  s.start().rotations = hhtdae::Rotations::Euler313; /* with Euler angles the state that is read below contains whole attitudes */
   const Array u = run(s, 1, "-ts_rtol 1e-7 -ts_atol 1e-7", &v);
   EXPECT_EQ(DataOf(s).started.rows, 30);
   EXPECT_EQ(DataOf(s).started.redundant, 1);
@@ -361,7 +364,7 @@ TEST(SceneRedundant, Bricard)
     energy += 0.5 * m.v.squaredNorm() + 0.5 * w.dot(DataOf(s).bodies[b].inertia * w) + 9.81 * m.r(1);
     start += 9.81 * DataOf(s).bodies[b].r(1);
   }
-  /* the last hinge, whose row was dropped or not */
+  /* the last hinge, whose redundant row was dropped */
   const Vector3 end = R.bodies.now[4].r + R.bodies.now[4].A * Vector3(0.5, 0, 0);
   EXPECT_LT((end - Vector3(0, 0, 1)).norm(), 1e-6);
   EXPECT_NEAR(energy, start, 1e-3);
@@ -390,7 +393,7 @@ TEST(SceneRedundant, RefusedOrKept)
   EXPECT_EQ(ModelOf(s).n, 18 + 20);
 }
 
-/* Links in one line: a row is dependent there and nowhere else */
+/* Links in one line: a row is dependent only in this singular position and must not be dropped */
 TEST(SceneRedundant, ASingularStartDropsNothing)
 {
   Scene      s(PETSC_COMM_SELF, Space::Planar);
@@ -406,7 +409,8 @@ TEST(SceneRedundant, ASingularStartDropsNothing)
   EXPECT_TRUE(printed.says("singular position: 1 constraints are redundant there and 0 next to it")) << printed.text();
 }
 
-/* A kinematically driven mechanism is legal; a motion that repeats a joint's row is not needed */
+/* A kinematically driven mechanism without degrees of freedom is allowed; a motion that repeats the row of a joint is
+   redundant */
 TEST(SceneRedundant, NoDegreesOfFreedom)
 {
   Scene        s(PETSC_COMM_SELF);
@@ -434,7 +438,7 @@ TEST(SceneRedundant, ANetOfLoops)
     const int                  bodies = 2 * n * (n - 1), hinges = 2 * bodies - n * n + 1, loops = hinges - bodies;
     EXPECT_EQ(r.rows, 5 * hinges);
     EXPECT_EQ(r.redundant, 3 * loops);
-    /* in the plane: three coordinates a rod, two rows a hinge */
+    /* planar: three coordinates per rod, two rows per hinge */
     EXPECT_EQ(r.degreesOfFreedom(), 3 * bodies - 2 * hinges);
     MEASURED("net of %d rods, %d rows, core %d: %d redundant, set-up in %.3f s", bodies, (int)r.rows, (int)r.core,
              (int)r.redundant, time);
@@ -458,7 +462,8 @@ TEST(SceneEquilibrium, AMassOnASpring)
   MEASURED("mass on a spring: %d steps to equilibrium", (int)DataOf(s).started.equilibrium_iterations);
 }
 
-/* A box hung by a spring off its centre of mass: spring, marker and centre of mass come to lie in one vertical line */
+/* A box suspended from a spring at a point off its centre of mass: spring, marker and centre of mass end up on a
+   vertical line */
 TEST(SceneEquilibrium, ABoxHungOffItsCentre)
 {
   Scene        s(PETSC_COMM_SELF);
@@ -488,7 +493,7 @@ TEST(SceneEquilibrium, APendulumFromAnywhere)
 {
   for (Space space : {Space::Planar, Space::Spatial}) {
     Scene      s(PETSC_COMM_SELF, space);
-    const Body arm = s.add("arm", rod({0, 0, 0}, {0.6, 0.8, 0})); /* above the pivot */
+    const Body arm = s.add("arm", rod({0, 0, 0}, {0.6, 0.8, 0})); /* initially above the pivot */
     pin(s, "hinge", arm, s.ground(), {0, 0, 0});
     s.gravity({0, -9.81, 0});
     s.start().equilibrium = true;

@@ -28,7 +28,7 @@ hhtex::SolidBeam strip(double depth, double width, int along, int across)
   return b;
 }
 
-/* Where the tip of a cantilever of 1 m along x is at rest under a force on its centroid */
+/* Equilibrium position of the tip of a cantilever of 1 m along x under a force at its centroid */
 Vector3 loaded(const hhtex::SolidBeam &beam, As as, const Vector3 &force)
 {
   FeModel         model(PETSC_COMM_SELF);
@@ -57,7 +57,8 @@ Vector3 loaded(const hhtex::SolidBeam &beam, As as, const Vector3 &force)
 
 } // namespace
 
-/* A column under half of Euler's load and under as much tension: the deflection of a beam that the axial force bends, or holds */
+/* A column under half of Euler's load, and under equal tension: the axial force increases or decreases the deflection
+   as in the beam equation */
 TEST(Stiffening, Column)
 {
   const hhtex::SolidBeam b  = strip(0.02, 0.02, 10, 1);
@@ -123,8 +124,9 @@ TEST(Stiffening, SpinUp)
   EXPECT_LT(worst, 3e-3);
 }
 
-/* Frequency of bending out of the plane of rotation, which it raises (Southwell): w^2 of a cantilever of EI = m = L = 1 at the speed by Ritz' method with
-   powers of x, to 10 digits; 6.4495 at a speed of 5 (Wright and others, J. Appl. Mech. 49, 1982) */
+/* Frequency of bending out of the plane of rotation, which increases with the speed (Southwell): w^2 of a cantilever
+   with EI = m = L = 1 by Ritz's method with powers of x, to 10 digits; 6.4495 at a speed of 5 (Wright and others, J.
+   Appl. Mech. 49, 1982) */
 static double flapping(double speed)
 {
   constexpr int   n = 8;
@@ -138,7 +140,7 @@ static double flapping(double speed)
   return std::sqrt(hhtest::EigenvaluesOf(K, M)(0));
 }
 
-/* Of the free vibration that a push across has left, by its passages through zero */
+/* Frequency of the free vibration after a lateral push, from its zero crossings */
 static double measured(bool stiffened)
 {
   FeModel         model(PETSC_COMM_SELF);
@@ -179,7 +181,8 @@ TEST(Stiffening, SouthwellsFrequencies)
   EXPECT_GT(std::abs(without - exact), 0.05 * exact);
 }
 
-/* As seen from the arm, which the linearization chooses by itself: in the plane of rotation the square of the frequency is that across less the speed's */
+/* In axes that rotate with the arm, which the linearization chooses itself: the square of the frequency in the plane
+   of rotation is that out of the plane minus the square of the speed */
 TEST(Stiffening, SouthwellsFrequenciesOfALinearization)
 {
   FeModel           model(PETSC_COMM_SELF);
