@@ -1,4 +1,4 @@
-/* The report on the all-terrain vehicle: what was run, what it cost, what came out, as one HTML page. */
+/* The report on the all-terrain vehicle: runs, their costs and results, as one HTML page */
 #ifndef HHTDAE_BENCH_ATV_PAGE_H
 #define HHTDAE_BENCH_ATV_PAGE_H
 
@@ -8,14 +8,14 @@
 namespace hhtbench
 {
 
-/* All that the page tells */
+/* Everything that the page shows */
 struct AtvResults {
-  AtvRun              reference, check; /* check: the reference at twice its step */
-  std::vector<AtvRun> main; /* hhtdae in both forms, IDA as GSTIFF, each with the largest step of the paper */
-  std::vector<double> step; /* at which conditions were measured */
+  AtvRun              reference, check; /* check: the reference with twice its step */
+  std::vector<AtvRun> main; /* hhtdae in both forms and IDA as GSTIFF, each with the largest step of the paper */
+  std::vector<double> step; /* step sizes at which condition numbers were computed */
   std::vector<hhtstab::Conditions>  condition;
-  std::vector<AtvRun>               sweep; /* over tolerances and largest steps, by name of the method */
-  int                               jobs = 1; /* of these at a time */
+  std::vector<AtvRun>               sweep; /* runs over tolerances and largest steps, by name of the method */
+  int                               jobs = 1; /* number of these runs at the same time */
   std::vector<HotSpot>              spots; /* of the reference */
   std::vector<std::vector<HotSpot>> found; /* of the main runs */
 };
@@ -23,7 +23,7 @@ struct AtvResults {
 class AtvPage
 {
 public:
-  /* scene: file of the page that shows the vehicle */
+  /* scene: file of the page with the animated vehicle */
   AtvPage(const AtvResults &results, const hhtex::Atv &atv, const ReducedBody &body, const AtvStress &stress, const std::string &scene)
       : r_(results), atv_(atv), body_(body), stress_(stress), scene_(scene),
         page_("An all-terrain vehicle with a flexible frame: hhtdae and BDF")
@@ -256,8 +256,8 @@ private:
   }
   static std::string seconds(double x) { return std::isfinite(x) ? Text("%.2f", x) : "none"; }
 
-  /* CPU time of the fastest run of methods whose names begin so, with an error no larger; infinite where there is none
-   */
+  /* CPU time of the fastest run, among methods whose names begin with `method`, whose error is at most `error`;
+     infinite if there is none */
   double fastest(const std::string &method, PetscInt id, double error) const
   {
     double best = PETSC_INFINITY;

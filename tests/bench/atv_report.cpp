@@ -25,7 +25,7 @@ static PetscErrorCode Done(const AtvRun &run)
                   "%-34s eps %.0e, step at most %-7.3g %8.2f s CPU %7ld steps %7ld iterations %5ld factorizations %s\n",
                   run.name.c_str(), run.eps, run.step_max, run.cpu, run.count.steps, run.count.newton,
                   run.count.factorizations, run.failure.c_str()));
-  fflush(stdout); /* progress, through pipes too */
+  fflush(stdout); /* progress, visible through pipes too */
   PetscFunctionReturn(0);
 }
 
@@ -33,7 +33,7 @@ static PetscErrorCode Paper(TS ts) { return TSHHT3SetForm(ts, TSHHT3_FORM_PAPER)
 
 static PetscErrorCode LittleDamping(TS ts) { return TSHHT3SetAlpha(ts, -0.05); }
 
-/* Runs of the comparison, at its steps, whose samples take runs of their own */
+/* A run of the comparison: first timed without channels, then repeated for its samples */
 struct Timed {
   const char                       *name;
   std::function<PetscErrorCode(TS)> configure;
@@ -42,7 +42,7 @@ struct Timed {
 };
 static const Timed timed[] = {{"hhtdae, second-order form", nullptr}, {"hhtdae, paper's form", Paper}};
 
-/* They and IDA in turn, as often as asked; the median of the times */
+/* hhtdae's forms and IDA alternately, `repeats` times; the median of the times counts */
 static PetscErrorCode RunMain(const AtvRuns &runs, PetscInt repeats, std::vector<AtvRun> *all)
 {
   std::vector<std::vector<double>> times;
@@ -71,7 +71,7 @@ static PetscErrorCode RunMain(const AtvRuns &runs, PetscInt repeats, std::vector
   PetscFunctionReturn(0);
 }
 
-constexpr int sweep_samples = 5; /* errors at every fifth time of the reference: samples cost more than steps */
+constexpr int sweep_samples = 5; /* errors are evaluated at every fifth sample time of the reference, because samples cost more than steps */
 
 using Planned = std::function<PetscErrorCode(AtvRun *)>;
 
@@ -81,7 +81,7 @@ static std::vector<Planned> Sweep(AtvRuns runs, bool fine)
     const char                            *name;
     std::function<PetscErrorCode(TS)>      configure;
     std::vector<std::pair<double, double>> grid;      /* tolerance, largest step */
-    std::vector<std::pair<double, double>> fine = {}; /* of the fine sweep alone */
+    std::vector<std::pair<double, double>> fine = {}; /* only in the fine sweep */
   };
   const auto gridOf = [fine](const auto &m) {
     auto all = m.grid;
@@ -115,7 +115,7 @@ static std::vector<Planned> Sweep(AtvRuns runs, bool fine)
   return plan;
 }
 
-/* What a process of its own does, and how this one takes over what it has found */
+/* Work for a separate process, and how this process takes over its results */
 struct Task {
   std::function<bool(FILE *)> run, read;
 };
@@ -146,7 +146,7 @@ static Task Motion(const AtvRuns &runs, const ReducedBody &body, const std::stri
 
 constexpr PetscInt hot_spots = 10;
 
-/* Of a run of the comparison: its samples, where they are still to be made, and its hot spots */
+/* Task for a run of the comparison: its samples, if `still` is given, and its hot spots */
 static Task Spots(const AtvRuns &runs, const AtvStress &stress, const Timed *still, AtvRun *run, std::vector<HotSpot> *spots)
 {
   return {[=, &runs, &stress](FILE *file) {
@@ -162,7 +162,8 @@ static Task Spots(const AtvRuns &runs, const AtvStress &stress, const Timed *sti
           }};
 }
 
-/* Reference, reference at twice the step, conditioning, the page in motion, samples and hot spots of the timed runs, and the sweep */
+/* Reference, reference with twice the step, condition numbers, the animated page, samples and hot spots of the timed
+   runs, and the sweep */
 static PetscErrorCode RunOthers(const AtvRuns &runs, const ReducedBody &body, const AtvStress &stress, const std::string &page, bool sweep, bool fine, AtvResults *results)
 {
   const auto reference = [&runs](const char *name, double step) -> Planned {
@@ -205,7 +206,7 @@ static PetscErrorCode Run()
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-jobs", &jobs, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-sweep", &sweep, nullptr));
   PetscCall(PetscOptionsGetBool(nullptr, nullptr, "-fine", &fine, nullptr));
-  const double intervals = end / (sweep_samples * runs.dt); /* of the sweep's samples, which are some of the reference's */
+  const double intervals = end / (sweep_samples * runs.dt); /* distance of the sweep's sample times, which are a subset of the reference's */
   PetscCheck(end > 0 && repeats > 0 && jobs > 0, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end, -repeats and -jobs must be positive");
   PetscCheck(std::fabs(intervals - std::round(intervals)) < 1e-9, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE, "-end is %g s and must be a multiple of %g s",
              (double)end, sweep_samples * runs.dt);

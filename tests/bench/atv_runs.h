@@ -20,15 +20,15 @@ using namespace hhtdae;
 
 struct AtvRun {
   std::string                      name, failure;
-  PetscReal                        eps = 0, step_max = 0; /* 0: no bound */
-  double                           cpu       = 0;         /* of the solve, s */
+  PetscReal                        eps = 0, step_max = 0; /* 0: no limit of the step */
+  double                           cpu       = 0;         /* CPU seconds of the solve */
   long                             equations = 0;
   wp::Counters                     count;
   std::vector<double>              time;
   std::vector<std::vector<double>> x; /* channels at these times */
 };
 
-/* A run to a file and back, from the process that has made it */
+/* Writes a run to a file and reads it back in another process */
 template <class Values> bool WriteValues(const Values &x, FILE *file)
 {
   const size_t n = x.size();
@@ -68,14 +68,14 @@ class AtvRuns
 {
 public:
   std::shared_ptr<const ModalBody> model;
-  double                           end = 2, dt = 4e-3, limit = 120; /* s; of CPU time of a run */
+  double                           end = 2, dt = 4e-3, limit = 120; /* s; limit: CPU seconds of a run */
 
   using Configure = std::function<PetscErrorCode(TS)>;
 
-  /* What a run is made for. A sample in a step costs as much as ten steps, so that both take two runs. */
+  /* Purpose of a run. A sample within a step costs as much as ten steps, so that time and samples need two runs */
   enum Of { Time, Samples, Both };
 
-  /* configure comes after the tolerances. */
+  /* configure is called after the tolerances have been set */
   PetscErrorCode hht(const std::string &name, double eps, double step_max, const Configure &configure, AtvRun *run, Of of = Both) const
   {
     PetscFunctionBegin;
@@ -136,7 +136,7 @@ public:
   }
 #endif
 
-  /* The first of the runs once more, shown by a page */
+  /* Repeats the first run and writes its page */
   PetscErrorCode page(const ReducedBody &body, const std::string &file) const
   {
     TS      ts;
@@ -157,7 +157,7 @@ public:
     PetscFunctionReturn(0);
   }
 
-  /* cond_2 of the Newton matrix in the paper's three scalings, after ten steps, as steps of length h would have it */
+  /* cond_2 of the Newton matrix in the paper's three scalings, after ten steps, for a step of length h */
   PetscErrorCode conditions(const std::vector<double> &h, std::vector<hhtstab::Conditions> *list) const
   {
     TS ts;
@@ -183,10 +183,12 @@ public:
   }
 
 private:
-  /* IDA tests every unknown against the same absolute tolerance, in metres and radians. A modal coordinate has units of its own: its part is a tenth of
-     the reciprocal of the largest motion of an attachment per unit of it, the best for IDA of those tried. Errors of pitch rate and reaction with the largest
-     step of the paper: part 1 10 % and 14 %; the reciprocal 6.7 % and 12.5 %; a tenth of it 0.2 % and 0.4 %, all at 4,600 to 4,900
-     iterations. They are left behind by iterations that end too early; with IDA's iteration ended at 0.01 in place of a third part 1 gives 1.3 % and 1.2 %. */
+  /* IDA tests all unknowns against the same absolute tolerance, in metres and radians. A modal coordinate has other
+     units: its tolerance is multiplied by `part`, a tenth of the reciprocal of the largest motion of an attachment per
+     unit of the coordinate, the best of the values tried for IDA. Errors of pitch rate and reaction with the largest
+     step of the paper: part = 1 10 % and 14 %; the reciprocal 6.7 % and 12.5 %; a tenth of it 0.2 % and 0.4 %, all at
+     4,600 to 4,900 iterations. The errors are due to iterations that end too early: if IDA's iteration ends at 0.01 of
+     the error test instead of a third, part = 1 gives 1.3 % and 1.2 % */
   std::vector<double> partOfTolerance(const hhtex::Atv &atv, PetscInt n) const
   {
     std::vector<double> part(n, 1.);
@@ -225,7 +227,7 @@ private:
       run->x.push_back(x);
     });
     if (watched) PetscCall(watch.attach(ts));
-    const double begin = wp::ProcessorSeconds(); /* with the set-up, as of the others */
+    const double begin = wp::ProcessorSeconds(); /* including the set-up, as for the other solvers */
     PetscCall(atv.scene.solve(ts));
     run->cpu = wp::ProcessorSeconds() - begin;
     PetscCall(TSGetConvergedReason(ts, &reason));
@@ -257,8 +259,8 @@ private:
   }
 };
 
-/* Largest difference of a channel from the reference, as a part of its largest value; NaN for a run that did not arrive. The reference may have samples
-   between those of the run. */
+/* Largest difference of a channel from the reference, relative to its largest value; NaN for a run that did not reach
+   the end. The reference may have additional samples between those of the run */
 inline double Difference(const AtvRun &run, const AtvRun &reference, PetscInt channel)
 {
   double       most = 0, worst = 0;
@@ -271,7 +273,7 @@ inline double Difference(const AtvRun &run, const AtvRun &reference, PetscInt ch
 
 /* ---- stress ---- */
 
-/* Largest von Mises stress of one node through a run */
+/* Largest von Mises stress of one node during a run */
 struct NodeStress {
   double stress = 0, time = 0;
 };

@@ -27,7 +27,8 @@ static char help[] =
 #include <unistd.h>
 #include <vector>
 
-/* Threads of the BLAS would spin. The library reads its environment when it is loaded. */
+/* Several BLAS threads would waste time by busy waiting; OpenBLAS reads its environment only when it is loaded, so the
+   program is executed again */
 static void runSingleThreaded(char **argv)
 {
   if (getenv("OMP_NUM_THREADS") && getenv("OPENBLAS_NUM_THREADS")) return;
@@ -38,12 +39,12 @@ static void runSingleThreaded(char **argv)
 
 enum Part { Residual, Jacobian, Factor, Solve, Else, NumParts };
 
-constexpr PetscInt BEGIN = 10; /* steps that are left out */
+constexpr PetscInt BEGIN = 10; /* number of first steps that are not measured */
 
 struct Sample {
-  double   bytes = 0.;             /* resident after the run, less those before */
+  double   bytes = 0.;             /* resident memory after the run minus that before */
   double   begin = 0., total = 0.; /* CPU seconds of TSSolve() up to step BEGIN, and from there on */
-  double   part[NumParts] = {};    /* from there on, wall-clock seconds, as PETSc logs them */
+  double   part[NumParts] = {};    /* wall-clock seconds of the parts after step BEGIN, as logged by PETSc */
   PetscInt steps = 0, newton = 0, factored = 0, rejected = 0;
 };
 
@@ -63,7 +64,7 @@ static double clockSeconds(clockid_t clock)
 
 static bool logging = false;
 
-/* Only the events that are read cost time */
+/* Activates only the events that are read, because others cost time */
 static PetscErrorCode StartLog()
 {
   PetscFunctionBegin;
@@ -94,7 +95,7 @@ static PetscErrorCode ReadLog(double part[NumParts])
   PetscFunctionReturn(0);
 }
 
-/* The clocks and counters at one moment of a run */
+/* Clocks and counters at one moment of a run */
 struct Moment {
   double           cpu, wall, part[NumParts];
   TSHHT3Statistics stat;
@@ -182,7 +183,7 @@ static PetscErrorCode RunChain(Model model, PetscInt N, double angle, double eps
   if (model == Hand) {
     const hhtex::Chain problem(N, angle, 1e3);
     PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_SELF, problem, &ts, &U, &V));
-    PetscCall(TSSetTimeStep(ts, 0.1)); /* before the type PETSc's default, not set by anybody: the integrator chooses the first step */
+    PetscCall(TSSetTimeStep(ts, 0.1)); /* set before the type it does not count as set by the user: the first step is chosen */
     PetscCall(TSSetType(ts, TSHHT3));
     PetscCall(TS2SetSolution(ts, U, V));
     PetscCall(RunTS(ts, eps, steps, sample));
@@ -217,7 +218,7 @@ static double wall(const Sample &s)
   return sum;
 }
 
-/* In the run that other processes disturbed least: PETSc logs wall-clock time */
+/* From the run that other processes disturbed least, because PETSc logs wall-clock time */
 static double share(const std::vector<Sample> &samples, int part)
 {
   const Sample &s = *std::min_element(samples.begin(), samples.end(),
@@ -227,7 +228,7 @@ static double share(const std::vector<Sample> &samples, int part)
 
 struct Row {
   PetscInt N;
-  double   step, other, assembly; /* us per accepted step, shares of everything else, of residual and Jacobian */
+  double   step, other, assembly; /* us per accepted step; shares of everything else and of residual and Jacobian */
 };
 
 static Row PrintRow(Model model, PetscInt N, const std::vector<Sample> &plain, const std::vector<Sample> &events)
@@ -244,7 +245,7 @@ static Row PrintRow(Model model, PetscInt N, const std::vector<Sample> &plain, c
   return {N, 1e6 * total / steps, share(events, Else), share(events, Residual) + share(events, Jacobian)};
 }
 
-/* What the project asks of the chain */
+/* Compares the results with the project's limits */
 static void PrintVerdict(Model model, const std::vector<Row> &rows, const std::vector<Row> &hand)
 {
   for (const Row &r : rows) {

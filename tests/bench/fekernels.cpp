@@ -8,7 +8,7 @@ static char help[] = "Time per element of the finite-element kernels, one core.\
 
 using namespace hhtdae;
 
-/* Elements of the reference shape, each moved a little in its own way, so that nothing can be computed in advance */
+/* Elements near the reference shape, each distorted differently, so that the compiler cannot precompute anything */
 template <class Shape> static std::vector<fe::NodeVectors<Shape>> Elements(int count)
 {
   std::vector<fe::NodeVectors<Shape>> list(count);
@@ -41,7 +41,7 @@ template <class Shape> static PetscErrorCode TimeKernels(double seconds)
   fe::Mass<Shape>                           m;
   fe::NodeVectors<Shape>                    f, u = 0.01 * fe::NodeVectors<Shape>::Random();
   fe::NodeStress<Shape>                     s;
-  double                                    sum = 0; /* so that no result is unused */
+  double                                    sum = 0; /* uses every result, so that none is optimized away */
   const double k = Microseconds(seconds, [&](int i) { sum += fe::ElementStiffness<Shape>(X[i], lame, K) + K(0, 1); });
   const double w =
       Microseconds(seconds, [&](int i) { sum += fe::ElementMass<Shape>(X[i], steel.density, m) + m(0, 1); });

@@ -33,7 +33,7 @@ struct Case {
   PetscBool        blocks = PETSC_FALSE;
 };
 
-/* Rubber, 2 cm a brick */
+/* Material: rubber; bricks of 2 cm */
 static PetscErrorCode ReadCase(Case *c)
 {
   const char *const laws[]  = {"large", "small", "Law", "", nullptr};
@@ -66,7 +66,7 @@ static PetscErrorCode ReadCase(Case *c)
   PetscFunctionReturn(0);
 }
 
-/* First bending period of the cantilever, of the free beam, or between pins */
+/* First bending period of the cantilever, of the free beam, or of the rod between pins */
 static double Period(const Case &c)
 {
   const hhtex::SolidBeam &b    = c.block;
@@ -83,8 +83,8 @@ static const Matrix3 &AlongY() /* axes of markers of hinges */
 
 static double CrankSpeed(const Case &c) { return 2 * PETSC_PI / (c.turn * Period(c)); }
 
-/* The crank of a quarter of the rod's length stands up from the origin, turns about y at constant speed, and pushes the
-   slider, which has the rod's mass, along x. With the crank up the rod moves without turning. */
+/* The crank, a quarter of the rod's length, points up from the origin and rotates about y at constant speed; it moves
+   the slider, which has the rod's mass, along x. With the crank pointing up the rod translates */
 static PetscErrorCode BuildSliderCrank(const Case &c, const FeModel &model, Scene &scene, FullFeBody *fe)
 {
   const double            length = c.block.length, r = length / 4, mass = c.block.material.density * length * c.block.area(), speed = CrankSpeed(c);
@@ -140,7 +140,7 @@ static PetscErrorCode Build(const Case &c, const FeModel &model, Scene &scene, F
   PetscFunctionReturn(0);
 }
 
-/* What algebraic multigrid wants to know */
+/* Gives algebraic multigrid the block size and the rigid-body modes */
 static PetscErrorCode TellBlocks(TS ts, Mat K)
 {
   Mat          J, P;
@@ -156,12 +156,12 @@ static PetscErrorCode TellBlocks(TS ts, Mat K)
 /* ---- results ---- */
 
 struct Clock {
-  PetscLogDouble   run = 0, start = 0; /* the run, its second step */
-  double           processor[2] = {};  /* likewise */
+  PetscLogDouble   run = 0, start = 0; /* of the whole run, of the second step */
+  double           processor[2] = {};  /* the same in processor time */
   TSHHT3Statistics first = {};
-  PetscLogStage    stage = -1; /* steps after the first */
+  PetscLogStage    stage = -1; /* log stage of the steps after the first */
 
-  /* the first step has ended */
+  /* called at the end of the first step */
   static PetscErrorCode monitor(TS ts, PetscInt step, PetscReal, Vec, void *ctx)
   {
     Clock *c = static_cast<Clock *>(ctx);
@@ -175,7 +175,7 @@ struct Clock {
   }
 };
 
-/* Peaks of resident memory, MB: the largest of a rank and the sum */
+/* Peaks of resident memory in MB: the largest of a rank, and the sum */
 static PetscErrorCode Memory(double *most, double *all)
 {
   PetscFunctionBeginUser;
@@ -230,7 +230,7 @@ static PetscErrorCode Report(TS ts, const Case &c, const Clock &clock, double bu
   PetscCall(Solver(ts, &solver));
   PetscCall(Memory(&most, &all));
   const double n          = (double)PetscMax(s.steps - clock.first.steps, 1);
-  double       processor[2] = {clock.processor[1] - clock.processor[0], (ProcessorSeconds() - clock.processor[1]) / n}; /* first step, a further one */
+  double       processor[2] = {clock.processor[1] - clock.processor[0], (ProcessorSeconds() - clock.processor[1]) / n}; /* first, later step */
   char         turned[64] = "";
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, processor, 2, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
   PetscCall(TSGetTime(ts, &end));
@@ -266,7 +266,7 @@ static PetscErrorCode Run()
   scene.gravity({0, 0, -9.81});
   if (c.held == ROD) PetscCall(BuildSliderCrank(c, model, scene, &fe));
   else PetscCall(Build(c, model, scene, &fe));
-  if (c.law == FeLaw::Large && !c.blocks) { /* the body has its elements */
+  if (c.law == FeLaw::Large && !c.blocks) { /* the body contains its elements */
     PetscCall(MatDestroy(&model.K));
     PetscCall(MatDestroy(&model.M));
   }

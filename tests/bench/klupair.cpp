@@ -34,7 +34,7 @@ static PetscErrorCode residual_of(Mat A, Mat F, Vec b, Vec x, Vec r, Times *t)
   PetscFunctionReturn(0);
 }
 
-/* Coordinates a little heavier from one matrix to the next, as when the step size changes */
+/* Slightly increases the mass of the coordinates from one matrix to the next, as a change of the step size does */
 static PetscErrorCode change(Mat A, PetscInt coordinates)
 {
   PetscFunctionBeginUser;

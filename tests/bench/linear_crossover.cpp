@@ -74,7 +74,7 @@ static PetscErrorCode count_work(Mat A, LinearWork *work)
   PetscFunctionReturn(0);
 }
 
-/* What LinearChoose() makes of the matrix */
+/* The solver that LinearChoose() selects for the matrix */
 static PetscErrorCode chosen(Mat A, std::string *name)
 {
   KSP           ksp;

@@ -28,10 +28,10 @@ struct Triplets {
   }
 };
 
-/* Entries of the same place are added up */
+/* Entries at the same position are added */
 inline PetscErrorCode create_matrix(const Triplets &e, Mat *A)
 {
-  std::vector<PetscInt> row = e.row, col = e.col; /* PETSc sorts them in place */
+  std::vector<PetscInt> row = e.row, col = e.col; /* copied, because PETSc sorts them in place */
 
   PetscFunctionBegin;
   PetscCall(MatCreate(PETSC_COMM_SELF, A));
@@ -70,12 +70,10 @@ inline Triplets chain(PetscInt bodies, PetscInt modes)
   return e;
 }
 
-/*
-  Bodies in space, each hinged to the one before by a revolute joint: position and three angles per body, with blocks of
-  3 x 3 for mass and inertia, and per joint three multipliers of its point and two of its axis. As in a moving chain no
-  two bodies have the same orientation. loops > 0 closes a ring of so many bodies, again and again, by spherical joints.
-  Unknowns: all coordinates, then all multipliers.
-*/
+/* Bodies in space, each connected to the one before by a revolute joint: position and three angles per body, with 3 x
+   3 blocks for mass and inertia; per joint three multipliers for its point and two for its axis. As in a moving chain
+   no two bodies have the same orientation. loops > 0: spherical joints close a ring after every so many bodies.
+   Unknowns: all coordinates, then all multipliers */
 inline Triplets spatial_chain(PetscInt bodies, PetscInt loops = 0)
 {
   Triplets    e;
@@ -105,7 +103,7 @@ inline Triplets spatial_chain(PetscInt bodies, PetscInt loops = 0)
   return e;
 }
 
-/* nx * ny * nz cubic bricks, M + beta h^2 K, the face x = 0 held by three multipliers per node */
+/* nx * ny * nz cubic bricks, M + beta h^2 K; if clamped, the face x = 0 is held by three multipliers per node */
 inline Triplets block(PetscInt nx, PetscInt ny, PetscInt nz, bool clamped)
 {
   using namespace elasticblock;

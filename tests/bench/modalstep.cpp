@@ -51,10 +51,10 @@ static PetscErrorCode MakeBody(PetscInt bricks, PetscInt modes, ReducedBody *bod
     builder.addSet(Name(a), [=](const Vector3 &x) { return std::abs(x[0] - x0) < 0.51 * size; });
     Attachment attachment;
     attachment.name = Name(a);
-    attachment.tie  = Tie::Average; /* sections overlap no nodes only where there are more bricks than attachments */
+    attachment.tie  = Tie::Average; /* only if there are more bricks than attachments do neighbouring sections have no common nodes */
     reduction.attachments.push_back(attachment);
   }
-  reduction.modes = modes; /* constraint modes come on top, the highest are left out */
+  reduction.modes = modes; /* constraint modes are added; the highest modes are then left out */
   for (PetscInt k = 0; k < modes; k++) reduction.keep.push_back(k);
   PetscCall(Reduce(model, reduction, body));
   PetscFunctionReturn(0);
@@ -131,7 +131,7 @@ static PetscErrorCode RunScene(std::shared_ptr<const ModalBody> model, PetscInt 
 
 /* ---- the bound ---- */
 
-/* CPU seconds of a call, from as many as take 50 ms */
+/* CPU seconds of a call, from as many calls as take 50 ms */
 template <class F> static double Seconds(F &&call)
 {
   const std::clock_t start = std::clock();
@@ -154,7 +154,7 @@ struct Bound {
   }
 };
 
-/* By PETSc's dense matrices, which are thin covers of LAPACK and BLAS */
+/* By PETSc's dense matrices, which call LAPACK and BLAS with little overhead */
 static PetscErrorCode Dense(const ModalBody &body, PetscInt attachments, Bound *t)
 {
   const PetscInt  m = body.modes(), n = 6 + m;
@@ -210,7 +210,7 @@ static PetscErrorCode Dense(const ModalBody &body, PetscInt attachments, Bound *
 
 /* ---- the program ---- */
 
-/* Microseconds of a step and of its bound; ratios to that, and to the bound with the attachments */
+/* Microseconds of a step and of its bound; ratios to the bound, and to the bound with attachments */
 struct Ratios {
   double step, bound, first, second;
 };
@@ -227,7 +227,7 @@ static Ratios Compared(const Bound &d, const TSHHT3Statistics &s, double seconds
   return {seconds / steps, bound / steps, seconds / bound, seconds / all};
 }
 
-/* Only what the bound counts */
+/* Only the counters that enter the bound */
 static TSHHT3Statistics Difference(TSHHT3Statistics all, const TSHHT3Statistics &less)
 {
   all.steps -= less.steps;
@@ -303,7 +303,8 @@ static PetscErrorCode Run()
   PetscFunctionReturn(0);
 }
 
-/* Threads of the BLAS would spin. The library reads its environment when it is loaded. */
+/* Several BLAS threads would waste time by busy waiting; OpenBLAS reads its environment only when it is loaded, so the
+   program is executed again */
 static void runSingleThreaded(char **argv)
 {
   if (getenv("OMP_NUM_THREADS") && getenv("OPENBLAS_NUM_THREADS")) return;

@@ -13,8 +13,8 @@ static char help[] =
 
 struct Candidate {
   const char *name, *pc, *package, *ordering;
-  PetscInt    icntl7;        /* MUMPS's own ordering; -1: leave it */
-  bool        definite_only; /* SuperLU_DIST ends the program on a zero diagonal entry */
+  PetscInt    icntl7;        /* MUMPS' option ICNTL(7), the ordering; -1: default */
+  bool        definite_only; /* SuperLU_DIST aborts the program at a zero diagonal entry */
 };
 
 static const Candidate candidates[] = {{"MUMPS LDL^T METIS", PCCHOLESKY, "mumpsnd", MATORDERINGMETISND, -1, false},

@@ -45,7 +45,7 @@ public:
   void text(const std::string &paragraph) { body_ << "<p>" << escaped(paragraph) << "</p>\n"; }
   void code(const std::string &lines) { body_ << "<pre>" << escaped(lines) << "</pre>\n"; }
 
-  /* The first column stands left, numbers stand right; a row that begins with '!' is marked, as a failure is */
+  /* The first column is aligned left, the others right; a row that begins with '!' is highlighted as a failure */
   void table(const Row &head, const std::vector<Row> &rows, const std::string &caption = "")
   {
     body_ << "<div class='wide'><table>";
@@ -58,7 +58,7 @@ public:
     body_ << "</table></div>\n";
   }
 
-  /* A PNG file as part of the page */
+  /* Embeds a PNG file in the page */
   PetscErrorCode picture(const std::string &file, const std::string &caption)
   {
     PetscFunctionBegin;
@@ -71,7 +71,7 @@ public:
     PetscFunctionReturn(0);
   }
 
-  /* A whole HTML page as part of this one */
+  /* Embeds a whole HTML page in this one */
   PetscErrorCode frame(const std::string &file, const std::string &caption)
   {
     PetscFunctionBegin;
@@ -84,7 +84,7 @@ public:
     PetscFunctionReturn(0);
   }
 
-  /* gnuplot's commands, drawn into the page as SVG of the given size; without gnuplot the caption says so */
+  /* Runs gnuplot's commands and embeds the drawing as SVG of the given size; without gnuplot the caption says so */
   PetscErrorCode plot(const std::string &commands, const std::string &caption, int width = 900, int height = 480)
   {
     PetscFunctionBegin;

@@ -1,4 +1,4 @@
-/* What this process has used so far */
+/* Resources that this process has used so far */
 #ifndef HHTDAE_BENCH_PROCESS_USE_H
 #define HHTDAE_BENCH_PROCESS_USE_H
 
@@ -8,7 +8,7 @@
 namespace hhtbench
 {
 
-/* Processor time of all its threads, s */
+/* Processor time of all threads, s */
 inline double ProcessorSeconds()
 {
   timespec t = {};
@@ -16,7 +16,7 @@ inline double ProcessorSeconds()
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Its largest resident memory, 1e6 bytes (of Linux, which counts in 1024 bytes) */
+/* Largest resident memory, 1e6 bytes (Linux counts in 1024 bytes) */
 inline double PeakMegabytes()
 {
   rusage use = {};

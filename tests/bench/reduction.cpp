@@ -18,21 +18,20 @@ using namespace hhtdae;
 static Box Frame(const PetscInt n[3], PetscInt bar)
 {
   Box box = {{(int)n[0], (int)n[1], (int)n[2]}, {0.02 * n[0], 0.02 * n[1], 0.02 * n[2]}};
-  /* tapered a little, so that equal frequencies of equal bars do not hide the usual case */
+  /* slightly tapered, because equal bars would have multiple frequencies, which is not the usual case */
   box.map = [](Vector3 x) {
     return Vector3(x[0], x[1] * (1 + 0.05 * x[0] - 0.02 * x[2]), x[2] * (1 + 0.08 * x[0] + 0.03 * x[1]));
   };
   box.present = [=](int i, int j, int k) {
     const int cell[3] = {i, j, k};
-    int       inside  = 0; /* directions in which the brick is not at an edge */
+    int       inside  = 0; /* number of directions in which the brick is not at an edge of the box */
     for (int c = 0; c < 3; c++) inside += cell[c] >= bar && cell[c] < n[c] - bar;
     return inside <= 1;
   };
   return box;
 }
 
-/* Attachments at places spread over the frame's edges along x: all nodes of a piece of the bar's cross-section, two
- * bricks long */
+/* Attachments at places along the frame's edges in x: each consists of all nodes of a piece of the bar, two bricks long */
 static void AddAttachments(const Box &box, PetscInt bar, PetscInt count, Tie tie, BoxBuilder *builder,
                            Reduction *reduction)
 {

@@ -1,5 +1,5 @@
-/* Axes of the Euler angles of a scene's bodies: those that keep away from the singularity on a given way, and the
- * change to others. */
+/* Axes of the Euler angles of a scene's bodies: choice of axes that keep a given motion away from the singularity, and
+   the change to other axes */
 #ifndef HHTDAE_BENCH_SCENE_AXES_H
 #define HHTDAE_BENCH_SCENE_AXES_H
 
@@ -12,14 +12,14 @@
 namespace hhtbench
 {
 
-/* Of one body on its way: the third axis of space in body axes, which the axis that theta is measured from must not
- * come near */
+/* Attitudes of one body during its motion: the third axis of space in body axes. The axis from which theta is measured
+   must not come near it */
 using Attitudes = std::vector<hhtdae::Vector3>;
 
-/* A monitor that collects them for all bodies with Euler angles */
+/* A monitor that collects the attitudes of all bodies with Euler angles */
 struct AttitudeWatch {
   hhtdae::Runtime        &R;
-  std::vector<Attitudes> &path; /* of every body */
+  std::vector<Attitudes> &path; /* one entry per body */
 };
 
 inline PetscErrorCode WatchAttitudes(TS, PetscInt, PetscReal, Vec U, void *ctx)
@@ -41,8 +41,9 @@ inline PetscErrorCode WatchAttitudes(TS, PetscInt, PetscReal, Vec U, void *ctx)
   PetscFunctionReturn(0);
 }
 
-/* The body-fixed direction that stays farthest from the third axis of space and its opposite, of many on a half
-   sphere, as z axis of the Euler angles' axes; these as a quaternion. Returns the smallest |sin theta|. */
+/* From many directions on a half sphere, chooses the body-fixed direction that stays farthest from the third axis of
+   space and its opposite, as z axis of the Euler angles' axes; returns these axes as a quaternion, and the smallest
+   |sin theta| */
 inline double ChooseAxes(const Attitudes &path, double *quaternion)
 {
   hhtdae::Vector3 best  = hhtdae::Vector3::UnitZ();
@@ -57,13 +58,13 @@ inline double ChooseAxes(const Attitudes &path, double *quaternion)
     worst = near;
     best  = c;
   }
-  /* the turn from `best`, which is above the plane, to z */
+  /* the rotation from `best`, which is in the upper half space, to z */
   const Eigen::Vector4d q = Eigen::Vector4d(1. + best[2], best[1], -best[0], 0.).normalized();
   for (int i = 0; i < 4; i++) quaternion[i] = q[i];
   return std::sqrt(1. - worst * worst);
 }
 
-/* An attitude and an angular velocity as Euler angles of these axes and their rates */
+/* Converts an attitude and an angular velocity to Euler angles about these axes and their rates */
 inline void ToAxes(const hhtdae::BodyMotion &b, const hhtdae::Matrix3 &axes, double *eps, double *rate)
 {
   hhtdae::Matrix3       A;

@@ -35,7 +35,7 @@ namespace hhtbench
 class SceneProblem : public hhtex::Problem
 {
 public:
-  /* A scene on this communicator that has not been set up; it may be part of something that holds it */
+  /* Makes a scene on this communicator that has not been set up; the scene may be a member of another object */
   using Build = std::function<std::shared_ptr<hhtdae::Scene>(MPI_Comm)>;
 
   static PetscErrorCode make(const std::string &name, const Build &build, double end, std::unique_ptr<SceneProblem> *p)
@@ -56,9 +56,9 @@ public:
   }
 
   hhtdae::Scene   &scene() const { return *scene_; }
-  hhtdae::Runtime &run() const { return *hhtdae::RunOf(ts_); } /* which residual and Jacobian belong to */
+  hhtdae::Runtime &run() const { return *hhtdae::RunOf(ts_); } /* the run whose residual and Jacobian are evaluated */
 
-  /* A TS of the scene's own, as any user gets it, at the start; type TSHHT3 with defaults */
+  /* A TS of the scene at its start, as a user gets it; type TSHHT3 with default settings */
   PetscErrorCode createTS(TS *ts) const
   {
     Vec U, V;
@@ -74,7 +74,8 @@ public:
     PetscCall(TSSetMaxSteps(*ts, 100000000));
     PetscFunctionReturn(0);
   }
-  /* The same with Euler angles: the problem's, for who evaluates its residual or integrates with another type, or about axes that the scene chooses */
+  /* The same with Euler angles, about the problem's axes if `problems`, otherwise about axes that the scene chooses.
+     For callers that evaluate the problem's residual or integrate with another type */
   PetscErrorCode createEulerTS(TS *ts, bool problems = true) const
   {
     Vec U, V;
@@ -90,9 +91,9 @@ public:
     PetscFunctionReturn(0);
   }
 
-  /* Runs hhtdae once; if a body gets new axes for its Euler angles on the way, bodies start with others, those which
-     their attitudes in this run leave farthest from the singularity. nearest: the smallest |sin theta| then. Before a
-     reference is added. */
+  /* Runs hhtdae once. If a body changes the axes of its Euler angles during the run, bodies get other axes for the
+     start: those that their attitudes in this run leave farthest from the singularity. nearest: the smallest |sin
+     theta| with these axes. To be called before references are added */
   PetscErrorCode fitAxes(double *nearest, double eps = 1e-5)
   {
     std::vector<Attitudes> path;
@@ -108,7 +109,7 @@ public:
     PetscFunctionReturn(0);
   }
 
-  /* The same, and an error if some body comes too near to it for any axes */
+  /* The same, and an error if a body comes too near to the singularity with any axes */
   PetscErrorCode checkAxes(double eps = 1e-5)
   {
     double nearest;
@@ -125,7 +126,8 @@ public:
   }
   static constexpr double singular() { return 0.1; }
 
-  /* Coordinates and velocities as hhtdae has them in the run of the latest TS, into angles about the axes of the start; on the turn next to near */
+  /* Converts hhtdae's coordinates and velocities in the run of the latest TS to angles about the axes of the start;
+     full turns are chosen nearest to `near` */
   void toStart(double *u, double *v, const double *near) const
   {
     hhtdae::Bodies &B = latest_->bodies;
@@ -140,8 +142,8 @@ public:
     }
   }
 
-  /* The scene's channels in a state; for accelerations and reactions a and the multipliers in u have to be right.
-     States have to come in the order of time if there are channels of angles, which are counted over full turns. */
+  /* The scene's channels in a state; accelerations and reactions are right if a and the multipliers in u are. With
+     channels of angles, which count full turns, states must come in the order of time */
   PetscErrorCode channels(double t, const double *u, const double *v, const double *a,
                           std::vector<double> &values) const
   {
@@ -154,7 +156,7 @@ public:
     PetscFunctionReturn(0);
   }
 
-  /* An accepted step, for who knows one: memories follow */
+  /* Tells the elements with memory of an accepted step, for integrators that know their accepted steps */
   void accept(const double *u, const double *v) const
   {
     hhtdae::Runtime &R = run();
@@ -163,8 +165,8 @@ public:
     for (auto &b : R.batches) b->accept(R.bodies);
   }
 
-  /* Adds d Phi/dt of the holonomic rows to f: exact, and the same wherever the bodies are, because time enters by
-   * motions alone */
+  /* Adds d Phi/dt of the holonomic rows to f. It is exact and does not depend on the positions, because time enters
+     only through motions */
   void phiT(double t, double *f) const
   {
     for (const auto &m : motions_) f[m.first] += (*m.second)(t).f1;
@@ -184,7 +186,7 @@ public:
   {
     const bool remembers = run().has_memory;
     if (remembers && t > last_.t && !last_.u.empty()) accept(last_.u.data(), last_.v.data());
-    if (evaluate(t, u, v, a, f)) std::fill_n(f, n, std::nan("")); /* PETSc has printed what is wrong */
+    if (evaluate(t, u, v, a, f)) std::fill_n(f, n, std::nan("")); /* PETSc has printed the error message */
     if (!remembers || !std::all_of(u, u + n, [](double x) { return std::isfinite(x); })) return;
     last_.t = t;
     last_.u.assign(u, u + n);
@@ -215,8 +217,8 @@ public:
     return times;
   }
 
-  /* The reference: one state more, in the order of time, behind the start. Of u multipliers, variables and force
-     states, and accelerations, are found anew: they follow from the rest, which integrators know better. */
+  /* Adds a state to the reference, in the order of time, after the start. Multipliers, variables, force states and
+     accelerations are computed again: they follow from the other unknowns, which integrators know more accurately */
   PetscErrorCode addReference(double t, const double *u, const double *v, const double *a)
   {
     State     s;
@@ -240,21 +242,21 @@ private:
   };
   std::shared_ptr<hhtdae::Scene> scene_;
   TS                             ts_              = nullptr; /* holds residual and Jacobian */
-  Vec                            x_[4]            = {};      /* without arrays: U, U', U'', F */
+  Vec                            x_[4]            = {};      /* U, U', U'', F, whose arrays are those of the caller */
   Mat                            J_               = nullptr; /* of ts_ */
   TSI2Function                   function_        = nullptr;
   TSI2Jacobian                   jacobian_        = nullptr;
   void                          *functionContext_ = nullptr, *jacobianContext_ = nullptr;
   std::vector<PetscInt>          row_, col_;
-  std::vector<double>            u0_, v0_, axes_; /* the start; axes and memories there */
+  std::vector<double>            u0_, v0_, axes_; /* the start, its axes and memories */
   std::vector<State>             states_;
-  mutable State                  last_;                                    /* evaluated */
+  mutable State                  last_;                                    /* the last state evaluated */
   mutable hhtdae::Runtime       *latest_          = nullptr;               /* of the TS made last */
-  std::vector<std::pair<PetscInt, const hhtdae::TimeFunction *>> motions_; /* rows and what they follow */
+  std::vector<std::pair<PetscInt, const hhtdae::TimeFunction *>> motions_; /* rows and their functions of time */
 
   SceneProblem() = default;
 
-  /* hhtdae from start to end; the attitudes of all bodies with Euler angles on the way */
+  /* Runs hhtdae from start to end and records the attitudes of all bodies with Euler angles */
   PetscErrorCode runOnce(double eps, std::vector<Attitudes> &path, PetscInt *changes) const
   {
     TSHHT3Statistics  s;
@@ -279,7 +281,7 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* of the start, as the scene loads them */
+  /* axes at the start, as the scene uses them */
   hhtdae::Matrix3 axes(PetscInt b) const
   {
     const double *x = &axes_[4 * b];
@@ -363,7 +365,7 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* Rows that are f(t) minus an angle or an advance */
+  /* Finds the rows that are f(t) minus an angle or a displacement */
   template <class K> void findMotions()
   {
     for (const auto &b : run().batches)
@@ -409,8 +411,8 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* Accelerations, multipliers, variables and force states that belong to q, q' and the states of s, as hhtdae starts
-     from them: the beginning of one step. Not found: s stays as it is. */
+  /* Computes accelerations, multipliers, variables and force states that are consistent with q, q' and the states of
+     s, like hhtdae's start: taken from the beginning of one step. If they are not found s is not changed */
   PetscErrorCode consistent(State &s, PetscBool *found) const
   {
     TS                ts;
@@ -446,7 +448,7 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* Axes and memories of the start */
+  /* Sets axes and memories of the start in a run */
   PetscErrorCode useAxes(hhtdae::Runtime &R) const
   {
     PetscFunctionBegin;
@@ -461,7 +463,7 @@ private:
     PetscCall(useAxes(run()));
     PetscFunctionReturn(0);
   }
-  /* What the elements remember now, into another run */
+  /* Copies what the elements remember at present to another run */
   PetscErrorCode remember(hhtdae::Runtime &R) const
   {
     PetscFunctionBegin;
@@ -475,7 +477,7 @@ private:
 
   PetscErrorCode place(const double *u, const double *v, const double *a) const
   {
-    PetscFunctionBegin; /* PETSc's arrays are not const, but nobody writes to these */
+    PetscFunctionBegin; /* PETSc's arrays are not const, but these are not written to */
     PetscCall(VecPlaceArray(x_[0], u));
     PetscCall(VecPlaceArray(x_[1], v));
     PetscCall(VecPlaceArray(x_[2], a));

@@ -1,7 +1,6 @@
-/*
-  Runs that do not depend on one another, several at a time, each in a process of its own. What a process has found goes through a file without a name.
-  A process has its own CPU time, so that runs are measured as if they came one after the other, but for the memory and its bandwidth that they share.
-*/
+/* Independent runs, several at a time, each in a process of its own, which returns its results through an unnamed
+   file. Each process has its own CPU time, so that runs are measured as if they were made one after the other, except
+   for the memory and the memory bandwidth that they share */
 #ifndef HHTDAE_BENCH_SIDE_BY_SIDE_H
 #define HHTDAE_BENCH_SIDE_BY_SIDE_H
 
@@ -16,8 +15,8 @@
 namespace hhtbench
 {
 
-/* run(k, file) of k = 0 ... count - 1 in processes of their own, `jobs` at a time; read(k, file) here when run k is through, its file from the beginning.
-   False of either: it has failed. */
+/* Calls run(k, file) for k = 0 ... count - 1 in separate processes, `jobs` at a time, and read(k, file) in this
+   process when run k has ended, with the file at its beginning. Either returns false if it has failed */
 inline PetscErrorCode SideBySide(int jobs, int count, const std::function<bool(int, FILE *)> &run, const std::function<bool(int, FILE *)> &read)
 {
   struct Process {
@@ -31,7 +30,7 @@ inline PetscErrorCode SideBySide(int jobs, int count, const std::function<bool(i
     while (next < count && (int)running.size() < jobs) {
       FILE *file = std::tmpfile();
       PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "No temporary file for run %d", next);
-      std::fflush(nullptr); /* or the process would write it once more */
+      std::fflush(nullptr); /* otherwise the child process would write it again */
       const pid_t child = fork();
       PetscCheck(child >= 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "No process for run %d", next);
       if (!child) {

@@ -84,7 +84,7 @@ PetscErrorCode ReadCase(Case *c)
                   {"-end", &c->end}})
     PetscCall(PetscOptionsGetReal(nullptr, nullptr, o.first, o.second, nullptr));
   PetscCall(PetscOptionsGetInt(nullptr, nullptr, "-increments", &c->increments, nullptr));
-  for (const char *name : {"-ts_dt", "-ts_time_step"}) /* as PETSc calls it, before and since 3.25 */
+  for (const char *name : {"-ts_dt", "-ts_time_step"}) /* the option's names in PETSc before 3.25 and since */
     PetscCall(PetscOptionsGetReal(nullptr, nullptr, name, &c->h, nullptr));
   PetscCall(Name("-mesh", &c->mesh));
   PetscCall(Name("-write_mesh", &c->write_mesh));
@@ -118,8 +118,7 @@ PetscErrorCode ReadModel(const Case &c, FeModel *model)
   PetscFunctionReturn(0);
 }
 
-/* A force at the mean position of the nodes, which all have the same weight: the same part of it on each node. At rest the
-   time goes from 0 to 1. */
+/* The force acts in equal parts on all nodes of the tip. For static solutions the time goes from 0 to 1 */
 PetscErrorCode Build(const Case &c, const FeModel &model, Scene &scene, FullFeBody *fe)
 {
   FullBody  body;
@@ -152,7 +151,7 @@ struct Counts {
 struct Watcher {
   History *history;
   Counts  *counts;
-  double   every; /* 0: ends of steps */
+  double   every; /* 0: record the ends of steps */
   PetscInt done = 0;
 
   static PetscErrorCode monitor(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)
@@ -208,16 +207,15 @@ PetscErrorCode RunHHT(const Case &c, Scene &scene, TS ts, History &history, Coun
 
 /* ---- backward Euler, and rest, by SNES ---- */
 
-/*
-  Positions are the unknowns of a step: u' = (u - u_n)/h, u'' = (u' - u'_n)/h in the scene's equations, which is backward
-  Euler on the first-order system with u' eliminated. At rest both are zero. Rows of constraints are multiplied by a mean
-  diagonal entry s of the others, and so are multipliers' columns (the unknowns are lambda/s): with constraints as small as
-  they are LDL^T has to delay thousands of pivots, and takes more than twice as long.
-*/
+/* The positions are the unknowns of a step: u' = (u - u_n)/h, u'' = (u' - u'_n)/h in the scene's equations, which is
+   backward Euler on the first-order system with u' eliminated. For static solutions both are zero. Rows of constraints
+   are multiplied by a mean diagonal entry s of the other rows, and so are the columns of multipliers (the unknowns are
+   lambda/s): with unscaled constraints, whose entries are much smaller, LDL^T must delay thousands of pivots and takes
+   more than twice as long */
 struct Euler {
   TS      ts;
-  double  h, t = 0; /* h zero: at rest */
-  Vec     Un, Vn, V, A, scale, U; /* scale: 1, and s for multipliers; U: with lambda */
+  double  h, t = 0; /* h = 0: static */
+  Vec     Un, Vn, V, A, scale, U; /* scale: 1, and s for multipliers; U includes lambda */
   Counts *counts;
 
   PetscErrorCode motion(Vec U)
@@ -230,7 +228,7 @@ struct Euler {
     PetscCall(VecScale(A, 1 / h));
     PetscFunctionReturn(0);
   }
-  /* s from the matrix at x, where every factor is one yet */
+  /* Determines s from the matrix at x, at which all scale factors are still 1 */
   PetscErrorCode findScale(Vec x, Mat J)
   {
     IS          multipliers;
@@ -299,7 +297,7 @@ PetscErrorCode CreateSNES(Euler &e, const char *prefix, double force, SNES *snes
   PetscCall(SNESSetOptionsPrefix(*snes, prefix));
   PetscCall(SNESSetFunction(*snes, nullptr, Euler::function, &e));
   PetscCall(SNESSetJacobian(*snes, J, J, Euler::jacobian, &e));
-  /* none for the correction's size beside that of the positions, which are large beside displacements */
+  /* no test of the correction relative to the positions, which are large compared with displacements */
   PetscCall(SNESSetTolerances(*snes, 2e-8 * force, 1e-8, 0, 50, PETSC_DEFAULT));
   PetscCall(SNESGetLineSearch(*snes, &search));
   PetscCall(SNESLineSearchSetType(search, SNESLINESEARCHBASIC));

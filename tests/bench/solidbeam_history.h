@@ -1,5 +1,5 @@
-/* Displacements of chosen nodes of a beam: the two nearest to the corner of the tip with the largest coordinates and to the middle of the edge with the
- * largest y and z, and the mean of the tip. */
+/* Displacements of selected nodes of a beam: the nodes nearest to the corner of the tip with the largest coordinates
+   and to the middle of the edge with the largest y and z, and the mean over the tip */
 #ifndef HHTDAE_BENCH_SOLIDBEAM_HISTORY_H
 #define HHTDAE_BENCH_SOLIDBEAM_HISTORY_H
 
@@ -12,7 +12,7 @@
 class History
 {
 public:
-  /* An empty name: nothing is written */
+  /* If the name is empty nothing is written */
   PetscErrorCode open(const std::string &name, const hhtdae::FeModel &model, TS ts)
   {
     double low[3], high[3];
@@ -71,7 +71,7 @@ public:
 private:
   const hhtdae::FeModel *model_ = nullptr;
   PetscMPIInt    rank_  = 0;
-  PetscInt       first_ = 0, node_[2] = {-1, -1}, in_tip_ = 0; /* of this rank, or -1 */
+  PetscInt       first_ = 0, node_[2] = {-1, -1}, in_tip_ = 0; /* node on this rank, or -1 */
   FILE          *out_   = nullptr;
   double         last_[9] = {};
 
@@ -80,7 +80,7 @@ private:
     for (int k = 0; k < 3; k++) d[k] += weight * (u[first_ + 3 * node + k] - model_->coordinates[3 * (std::size_t)node + (std::size_t)k]);
   }
 
-  /* Among equally near ones the node with the least label */
+  /* Among equally near nodes the one with the smallest label */
   PetscErrorCode nearest(const hhtdae::Vector3 &x, PetscInt *node) const
   {
     double   least = PETSC_INFINITY, all;

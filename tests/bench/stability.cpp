@@ -49,7 +49,7 @@ static PetscErrorCode RunAll(bool *all_passed)
              "-form %s is neither second_order nor paper nor both", form);
 
   Table       table;
-  ChildReport lines; /* what a case says beyond its figure */
+  ChildReport lines; /* lines that a case reports in addition to its figure */
   const Cases cases = AllCases([&lines](const std::string &model, double h, const Conditions &c) {
     lines.add(hhtbench::Text("%-20s %.0e  %9.2e  %9.2e  %9.2e", model.c_str(), h, c.a, c.b, c.c));
   });

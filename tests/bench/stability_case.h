@@ -26,13 +26,13 @@
 namespace hhtstab
 {
 
-/* Plain data: it goes through a pipe from the process that runs the case */
+/* Plain data, because it is sent through a pipe by the process that runs the case */
 struct Outcome {
-  double           figure       = -1;    /* largest so far; NaN stays */
-  bool             finished     = false; /* came to its end time */
-  int              code         = 0;     /* PETSc's error; -1: the process crashed; -2: deadline */
-  double           t            = 0;     /* where it stopped */
-  double           seconds      = 0;     /* of CPU time, references included */
+  double           figure       = -1;    /* largest so far; NaN is kept */
+  bool             finished     = false; /* the run reached its end time */
+  int              code         = 0;     /* PETSc's error code; -1: the process crashed; -2: deadline */
+  double           t            = 0;     /* time at which the run stopped */
+  double           seconds      = 0;     /* of CPU time, including references */
   TSHHT3Statistics s            = {};
   char             message[400] = "", note[240] = "";
 };
@@ -57,7 +57,7 @@ public:
     va_end(arguments);
   }
 
-  /* Form, tolerance and options for a TS that has its end time */
+  /* Sets form, tolerance and options of a TS whose end time has been set */
   PetscErrorCode prepare(TS ts, double tolerance) const
   {
     PetscFunctionBegin;
@@ -67,7 +67,7 @@ public:
     PetscCall(TSSetFromOptions(ts));
     PetscFunctionReturn(0);
   }
-  /* Steps of one length */
+  /* Selects steps of constant length */
   static PetscErrorCode fixSteps(TS ts, double h)
   {
     TSAdapt adapt;
@@ -77,7 +77,7 @@ public:
     PetscCall(TSSetTimeStep(ts, h));
     PetscFunctionReturn(0);
   }
-  /* Keeps the counters whether or not the run succeeds. Numbers that are none in the final state spoil the figure. */
+  /* Stores the counters whether or not the run succeeds. NaN or infinity in the final state makes the figure NaN */
   PetscErrorCode solve(TS ts, const std::function<PetscErrorCode()> &solver = {})
   {
     TSConvergedReason reason;
@@ -101,20 +101,20 @@ public:
 
 struct Case {
   std::string kind, name, measure;
-  double      accept; /* largest figure; the same in both forms unless paper() says otherwise */
+  double      accept; /* largest figure accepted; the same in both forms unless paper() sets another */
   std::function<PetscErrorCode(Run &)> run;
-  std::string                          message = ""; /* words of the error that must end the run; "": it must finish */
-  bool                                 may_finish = false; /* with the figure, in place of that error */
+  std::string                          message = ""; /* words of the error that must end the run; empty: the run must finish */
+  bool                                 may_finish = false; /* the run may also finish with the figure instead of this error */
   double                               deadline   = 20;    /* seconds */
-  double accept_paper = -1;    /* the paper's form, of first order where M varies; negative: as accept */
-  bool   quick        = false; /* a test, too */
+  double accept_paper = -1;    /* for the paper's form, which is of first order where M varies; negative: as accept */
+  bool   quick        = false; /* also a unit test */
 
   Case &mustFail(const std::string &words)
   {
     message = words;
     return *this;
   }
-  /* Either is right: the end with the figure, or this error */
+  /* Both are accepted: the end of the run with the figure, or this error */
   Case &orFail(const std::string &words)
   {
     message    = words;
@@ -150,7 +150,7 @@ struct Case {
 
 using Cases = std::vector<Case>;
 
-/* Adds a case and returns it, to be qualified */
+/* Adds a case and returns it for further settings */
 inline Case &Add(Cases &cases, const std::string &kind, const std::string &name, const std::string &measure,
                  double accept, std::function<PetscErrorCode(Run &)> run)
 {
@@ -159,7 +159,7 @@ inline Case &Add(Cases &cases, const std::string &kind, const std::string &name,
   return cases.back();
 }
 
-/* The first message of an error is the result; nothing is printed */
+/* Error handler that keeps the first message of an error as the result and prints nothing */
 inline PetscErrorCode KeepMessage(MPI_Comm, int, const char *, const char *, PetscErrorCode code, PetscErrorType type,
                                   const char *message, void *ctx)
 {
@@ -168,7 +168,7 @@ inline PetscErrorCode KeepMessage(MPI_Comm, int, const char *, const char *, Pet
   return code;
 }
 
-/* Lines that the library prints belong to the case, not to the terminal */
+/* Suppresses the library's output, which belongs to the case, not to the terminal */
 inline PetscErrorCode Silent(FILE *, const char[], va_list) { return 0; }
 
 inline void RunCase(const Case &c, TSHHT3Form form, Outcome &out)
@@ -186,17 +186,16 @@ inline void RunCase(const Case &c, TSHHT3Form form, Outcome &out)
   out.seconds   = (double)(clock() - start) / CLOCKS_PER_SEC;
 }
 
-/*
-  What a tolerance promises. A linear oscillator whose steps the error test sets has a global error of 0.55 eps^(2/3) a
-  radian of its way (alpha = -0.3, h from k h^3 times the third derivative = eps). Mechanisms are allowed 20 times that:
-  their frequency follows the amplitude, so that phases drift.
-*/
+/* The error that a tolerance permits. A linear oscillator whose steps follow from the error test has a global error of
+   0.55 eps^(2/3) per radian of its motion (alpha = -0.3, h from k h^3 times the third derivative = eps). Mechanisms
+   are allowed 20 times as much, because their frequency depends on the amplitude, so that phases drift */
 inline double Allowed(double eps, double way) { return 11 * std::pow(eps, 2. / 3) * way; }
 
-/* The paper's form where M varies: the error of its first order is of the size of h, which goes like eps^(1/3) */
+/* The paper's form where M varies: its error, of first order, is of the size of h, which is proportional to eps^(1/3) */
 inline double AllowedFirstOrder(double eps, double way) { return std::pow(eps, 1. / 3) * way; }
 
-/* A jump of the acceleration by a is found to within h = sqrt(eps/(k a)), k = 0.1, which leaves this in the velocity */
+/* Error control locates a jump of the acceleration by a to within h = sqrt(eps/(k a)), k = 0.1; this is the resulting
+   error of the velocity */
 inline double AllowedJump(double eps, double a) { return std::sqrt(eps * a / 0.1); }
 
 inline std::string Name(const char *format, double x)

@@ -1,7 +1,5 @@
-/*
-  Brakes that take hold: friction F0 tanh(v/v0) that is steep about rest and flat on both sides of it, so that Newton's iteration
-  is thrown from one side to the other where a body comes to rest within a step.
-*/
+/* Brakes that engage: friction F0 tanh(v/v0), steep near zero velocity and flat on both sides, so that Newton's method
+   jumps between the two sides where a body comes to rest within a step */
 #ifndef HHTDAE_BENCH_STABILITY_CATCH_H
 #define HHTDAE_BENCH_STABILITY_CATCH_H
 
@@ -10,10 +8,9 @@
 namespace hhtstab
 {
 
-/*
-  Blocks of 1 kg on vertical guides (x, y and a multiplier for x = 0 each). Brakes grip them at t = 0.5, the first one falling, the second one on
-  its way up, with twice the force, at another time: one slides while the other has come to rest.
-*/
+/* Blocks of 1 kg on vertical guides (x, y and a multiplier for x = 0 each). Brakes engage at t = 0.5: the first block
+   is falling, the second one is moving up, has twice the force, and comes to rest at another time, so that one slides
+   while the other is at rest */
 struct Caught : hhtex::Problem {
   static constexpr double g = 9.81;
   const int               blocks;
@@ -54,7 +51,7 @@ struct Caught : hhtex::Problem {
       J.add(i + 2, i, 1);
     }
   }
-  /* free flight, constant deceleration, rest; creeping and the bend of tanh move it by some v0 */
+  /* free flight, constant deceleration, rest; creep and the smooth part of tanh change the height by some v0 */
   double height(int b, double t) const
   {
     const double before = std::min(t, grip[b]), y = speed[b] * before - g * before * before / 2, v = speed[b] - g * before;
@@ -80,14 +77,16 @@ inline void AddCatches(Cases &cases)
 {
   const struct {
     const char *name;
-    double      eps, h, accept; /* a step over the grip misses a velocity of up to F0 h, but takes no more than all of it: 5 m/s h. Where in a step it lies is
-                                   luck: with `grip` from 0.1 earlier to 0.16 later the worst are 0.165 and 5.4e-3. */
+    /* A step over the engagement misses a velocity of up to F0 h, but at most the whole velocity: an error of 5 m/s
+       h. It depends on where in the step the engagement is: with `grip` from 0.1 earlier to 0.16 later the worst
+       errors are 0.165 and 5.4e-3 */
+    double      eps, h, accept;
   } steps[] = {{"1e-3", 1e-3, 0, 0.17}, {"1e-6", 1e-6, 0, 6e-3}, {"1e-5, h=1e-3", 1e-5, 1e-3, 1e-2}};
   for (int blocks : {1, 2})
     for (double force : {2e1, 1e3, 1e6})
       for (double slope : {1e4, 1e6, 1e8, 1e10, 1e12})
         for (const auto &step : steps) {
-          if (force / slope > 0.011) continue; /* creeps */
+          if (force / slope > 0.011) continue; /* the block creeps too fast */
           Case &c = Add(cases, "catches", Name("%.0e N, ", force) + Name("%.0e N s/m, ", slope) + step.name + (blocks > 1 ? ", two" : ""), "height, exact",
                         step.accept + 2 * force / slope, [=](Run &r) { return CaughtCase(r, Caught(blocks, force, slope), step.eps, step.h); });
           if (slope > 1e9 && blocks > 1) c.test();

@@ -26,7 +26,7 @@ namespace hhtstab
 using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
 using LongVector = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
 
-/* Largest singular value of what apply() and its transpose stand for */
+/* Largest singular value of the matrix whose products are apply() and its transpose */
 template <class Apply> long double LargestSingularValue(Eigen::Index n, Apply apply)
 {
   LongVector  x    = LongVector::NullaryExpr(n, [](Eigen::Index i) { return 1 + std::sin(7.L * i); });
@@ -50,7 +50,7 @@ inline Conditions ConditionsOf(const LongMatrix &C, const LongVector &row, const
   const Eigen::PartialPivLU<LongMatrix> lu(C), lut(C.transpose());
   const Eigen::Index                    n = C.rows();
   double                                cond[3];
-  for (int s = 0; s < 3; s++) { /* A = R^-1 C K^-1 with R = row, 1, ... where (c) has it and this scaling has not */
+  for (int s = 0; s < 3; s++) { /* A = R^-1 C K^-1, where R and K contain the scalings of (c) that this case lacks */
     const LongVector R = s < 2 ? row : LongVector::Ones(n).eval(), K = s < 1 ? col : LongVector::Ones(n).eval();
     const auto       A = [&](const LongVector &x, bool transposed) -> LongVector {
       return transposed ? LongVector((C.transpose() * x.cwiseQuotient(R)).cwiseQuotient(K))
@@ -80,7 +80,7 @@ inline PetscErrorCode MarkRole(TS ts, TSHHT3Role role, double value, LongVector 
   PetscFunctionReturn(0);
 }
 
-/* At the present state of a TS on one rank, as a step of length h would have it */
+/* For the present state of a TS on one rank and a step of length h */
 inline PetscErrorCode ScalingConditions(TS ts, double h, Conditions *cond)
 {
   TSHHT3Form form;
@@ -118,11 +118,9 @@ inline PetscErrorCode ScalingConditions(TS ts, double h, Conditions *cond)
   PetscFunctionReturn(0);
 }
 
-/*
-  The table over h = 1e-2 ... 1e-8, printed by report() a line at a time. The figure is the largest of: change of (c)
-  from 1e-5 on, over 1 %; and growth from 1e-5 to 1e-8 within a factor of 2 of h^-4 for (a), whose mass block grows as
-  the range of the constraints shrinks, and of h^-2 for (b).
-*/
+/* The table over h = 1e-2 ... 1e-8, reported line by line. The figure is the largest of two: the change of (c) below h
+   = 1e-5, in units of 1 %; and the deviation of the growth from 1e-5 to 1e-8, in units of a factor of 2, from h^-4 for
+   (a), whose mass block grows relative to the constraints, and from h^-2 for (b) */
 using ConditionReport = std::function<void(const std::string &model, double h, const Conditions &)>;
 
 inline PetscErrorCode JudgeConditions(Run &run, TS ts, const std::string &model, const ConditionReport &report)

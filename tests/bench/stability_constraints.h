@@ -1,4 +1,4 @@
-/* Constraints that say the same thing twice, or nearly so, and positions where they lose rank. */
+/* Redundant and nearly redundant constraints, and positions in which constraints lose rank */
 #ifndef HHTDAE_BENCH_STABILITY_CONSTRAINTS_H
 #define HHTDAE_BENCH_STABILITY_CONSTRAINTS_H
 
@@ -11,10 +11,9 @@ namespace hhtstab
 
 /* ---- redundant ---- */
 
-/*
-  What a nearly redundant constraint does is a matter of the tolerance: within it the mechanism moves as the exact one,
-  beyond it the mechanism is locked, as it is by the letter. Either is right all the way, a mixture is wrong.
-*/
+/* The effect of a nearly redundant constraint depends on the tolerance: within the tolerance the mechanism moves like
+   one with an exactly redundant constraint, beyond it the mechanism is locked, as the equations say. Both are accepted
+   if they hold for the whole run; a mixture is an error */
 struct MovesOrStays {
   double moves = 0, stays = 0;
   void   operator()(const hhtdae::Vector3 &x, const hhtdae::Vector3 &moving, const hhtdae::Vector3 &start)
@@ -22,7 +21,8 @@ struct MovesOrStays {
     hhtex::Widen(moves, (x - moving).norm());
     hhtex::Widen(stays, (x - start).norm());
   }
-  /* Exactly redundant it must move; beyond the tolerance of the start, 1e-6, it must not, unless the run ends with an error as soon as the dropped row is violated by more */
+  /* If exactly redundant it must move. Beyond 1e-6, the tolerance of the start, it must not move, or the run must end
+     with an error as soon as the violation of the dropped row exceeds the tolerance */
   void judge(Run &run, double delta, bool error) const
   {
     run.judge(std::isnan(moves) || std::isnan(stays) ? NAN
@@ -33,11 +33,9 @@ struct MovesOrStays {
   }
 };
 
-/*
-  A coupler on three parallel cranks from 60 degrees. The middle one is longer by delta, which locks the mechanism to
-  second order only: its rows are redundant at the start and not next to it; or it stands askew by delta, which locks it
-  at once.
-*/
+/* A coupler on three parallel cranks, from 60 degrees. Either the middle crank is longer by delta, which locks the
+   mechanism only to second order (its rows are redundant at the start but not beside it); or the axis of the middle
+   crank is tilted by delta, which locks it at once */
 inline PetscErrorCode ThreeCranks(Run &run, double delta, bool askew)
 {
   using namespace hhtdae;
@@ -70,7 +68,7 @@ inline PetscErrorCode ThreeCranks(Run &run, double delta, bool askew)
   PetscFunctionReturn(code);
 }
 
-/* A door on two hinges, the second one's axis out of line by an angle */
+/* A door on two hinges; the axis of the second one is misaligned by an angle */
 inline PetscErrorCode Door(Run &run, double angle, hhtdae::Redundant policy)
 {
   using namespace hhtdae;
@@ -102,7 +100,7 @@ inline PetscErrorCode Door(Run &run, double angle, hhtdae::Redundant policy)
   PetscFunctionReturn(code);
 }
 
-/* The pendulum with its rod given twice, without a scene that could drop a row */
+/* The pendulum with its constraint given twice, without a scene that could drop a row */
 struct TwoRods : hhtex::Pendulum {
   TwoRods() : Pendulum(-60, 1, 1)
   {
@@ -171,7 +169,8 @@ inline void AddRedundant(Cases &cases)
 
 /* ---- singular positions ---- */
 
-/* Energy is what the flat position may take or give; the phase, which drifts with it, is told */
+/* Judged by the energy that the passage through the flat position may change; the phase, which drifts with the energy,
+   is only reported */
 inline PetscErrorCode FourBarCase(Run &run, double tolerance)
 {
   const hhtex::FourBar p(2, 10);
@@ -200,7 +199,7 @@ inline PetscErrorCode FourBarCase(Run &run, double tolerance)
   PetscFunctionReturn(code);
 }
 
-/* The four-bar mechanism as a scene that begins where it lies flat: which way it goes is not determined */
+/* The four-bar mechanism as a scene that begins in its flat position, where the direction of motion is not determined */
 inline PetscErrorCode FlatStart(Run &run)
 {
   using namespace hhtdae;
@@ -210,7 +209,7 @@ inline PetscErrorCode FlatStart(Run &run)
   rod.inertia  = Matrix3::Identity() / 12;
   Body    last = scene.ground();
   Vector3 at   = Vector3::Zero();
-  for (int k = 0; k < 3; k++) { /* crank to the right, coupler to the right, crank back */
+  for (int k = 0; k < 3; k++) { /* crank to the right, coupler to the right, rocker back */
     const Vector3 step(k < 2 ? 1 : -1, 0, 0);
     rod.position    = at + step / 2;
     const Body next = scene.add("rod " + std::to_string(k), rod);
@@ -264,7 +263,7 @@ inline PetscErrorCode BricardCase(Run &run)
 
 inline void AddSingular(Cases &cases)
 {
-  for (double eps : {1e-5, 1e-6, 1e-7, 1e-8}) /* 20 rad of motion: global error like eps^(2/3) */
+  for (double eps : {1e-5, 1e-6, 1e-7, 1e-8}) /* 20 rad of motion: global error proportional to eps^(2/3) */
     Add(cases, "singular", Name("four-bar lies flat, eps=%.0e", eps), "energy over the kinetic", Allowed(eps, 24),
         [eps](Run &r) { return FourBarCase(r, eps); });
   Add(cases, "singular", "slider-crank, dead centres", "position, exact", Allowed(1e-6, 60),

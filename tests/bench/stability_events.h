@@ -9,8 +9,8 @@ namespace hhtstab
 
 /* ---- impacts and friction ---- */
 
-/* An elastic ball that bounces six times: energy of its flights over that of the start. The tolerance is 1e-4 of the
-   depth to which the contact gives, and every bounce may cost 2 (1e-4)^(2/3). */
+/* An elastic ball that bounces six times, judged by the energy of its flights relative to that of the start. The
+   tolerance is 1e-4 of the penetration, and every bounce may change the energy by 2 (1e-4)^(2/3) */
 inline PetscErrorCode BounceCase(Run &run, double stiffness)
 {
   using namespace hhtdae;
@@ -40,8 +40,8 @@ inline PetscErrorCode BounceCase(Run &run, double stiffness)
   PetscFunctionReturn(0);
 }
 
-/* A block on an incline too flat to slide: the regularized law lets it creep at v_s atanh(tan/mu), from any speed. A
-   creep of v_s is seen at a tolerance below v_s times a second only. */
+/* A block on an incline too flat to slide: with the regularized friction law it creeps at v_s atanh(tan/mu), from any
+   initial velocity. A creep of v_s is resolved only if the tolerance is below v_s times a second */
 inline PetscErrorCode CreepCase(Run &run, double slip_velocity)
 {
   using namespace hhtdae;
@@ -51,7 +51,7 @@ inline PetscErrorCode CreepCase(Run &run, double slip_velocity)
   double       last = 0;
   PetscFunctionBegin;
   const Matrix3 axes =
-      Eigen::AngleAxisd(PETSC_PI / 2 + slope, Vector3::UnitY()).toRotationMatrix(); /* z down the incline */
+      Eigen::AngleAxisd(PETSC_PI / 2 + slope, Vector3::UnitY()).toRotationMatrix(); /* z points down the incline */
   block.velocity = 2 * axes.col(2);
   block.rotation = axes;
   const Marker m = scene.marker(scene.add("block", block)), guide = scene.marker(scene.ground(), Vector3::Zero(), axes);
@@ -70,7 +70,7 @@ inline PetscErrorCode CreepCase(Run &run, double slip_velocity)
   PetscFunctionReturn(0);
 }
 
-/* A block on a belt, held by a spring: sticks and slips */
+/* A block on a moving belt, held by a spring: stick-slip motion */
 struct Belt : hhtex::Problem {
   static constexpr double k = 40, mu = 0.3, fall = 0.6, belt = 0.5, g = 9.81;
   const double            slip;
@@ -87,7 +87,7 @@ struct Belt : hhtex::Problem {
     t1   = 5;
     role = {TSHHT3_COORDINATE};
   }
-  /* mu falls with the slip velocity, which is what makes it stick and slip again and again */
+  /* mu decreases with the slip velocity, which causes the stick-slip motion */
   template <class T> T force(T v) const
   {
     return (T)(g * mu) * std::tanh((v - (T)belt) / (T)slip) * (1 - (T)fall * s2(v) / (1 + s2(v)));
@@ -141,10 +141,10 @@ inline void AddImpacts(Cases &cases)
 
 /* ---- discontinuities ---- */
 
-/* x'' + w^2 x = F between t = 1 and t = 1 + width, F with unit impulse or unit size */
+/* x'' + w^2 x = F between t = 1 and t = 1 + width, where F has unit impulse or unit size */
 struct Jump : hhtex::Problem {
   const double w        = 5, force, end;
-  bool         by_event = false, on = false; /* the force is switched by events, else by the clock */
+  bool         by_event = false, on = false; /* the force is switched by events, otherwise by the time */
   Jump(double width, double size) : force(size), end(1 + width)
   {
     name = "jump";
@@ -165,7 +165,7 @@ struct Jump : hhtex::Problem {
   }
   bool reference(double t, double *u, double *v, double *a) const override
   {
-    u[0] = std::cos(w * t), v[0] = -w * std::sin(w * t), a[0] = -w * w * u[0]; /* moving, so that steps are short */
+    u[0] = std::cos(w * t), v[0] = -w * std::sin(w * t), a[0] = -w * w * u[0]; /* in motion from the start, so that steps are short */
     for (int k = 0; k < 2; k++) {
       const double s = t - (k ? end : 1), f = k ? -force : force;
       if (s <= 0) continue;
@@ -254,12 +254,12 @@ inline PetscErrorCode BangBangCase(Run &run)
   const BangBang p;
   PetscFunctionBegin;
   PetscCall(
-      ErrorOf(run, p, 1e-8)); /* 14 jumps, each with an error of the velocity that lasts for 10 s on the average */
+      ErrorOf(run, p, 1e-8)); /* 14 jumps, each with an error of the velocity that acts for 10 s on average */
   PetscFunctionReturn(0);
 }
 
-/* A base that is moved, with a jump of its acceleration, velocity or position at t = 1; a mass on a spring of 25 N/m
- * rides on it */
+/* A base whose prescribed motion has a jump of acceleration, velocity or position at t = 1; a mass on a spring of 25
+   N/m is mounted on it */
 inline PetscErrorCode MovedBase(Run &run, int derivative)
 {
   using namespace hhtdae;
@@ -287,7 +287,7 @@ inline PetscErrorCode MovedBase(Run &run, int derivative)
   scene.channel("rider", Measure::displacement(b, 0));
   PetscCall(RunScene(run, scene, 3, 1e-6, 0.02, [&](double t, const std::vector<double> &c) {
     const double s = t - 1, f = motion(t).f;
-    double       x = f; /* of the rider from its place at the start: f minus what the spring lags behind */
+    double       x = f; /* displacement of the mass from its start: f minus the lag of the spring */
     if (s > 0)
       x -= derivative == 2 ? (1 - std::cos(w * s)) / (w * w) : derivative == 1 ? std::sin(w * s) / w : std::cos(w * s);
     run.judge(c[0] - f);
@@ -299,7 +299,7 @@ inline PetscErrorCode MovedBase(Run &run, int derivative)
 inline void AddJumps(Cases &cases)
 {
   const char  *position = "position, exact";
-  const double smooth   = Allowed(1e-6, 20); /* of the oscillation */
+  const double smooth   = Allowed(1e-6, 20); /* error of the oscillation */
   Add(cases, "jumps", "force, 1 s", position, smooth + 2 * AllowedJump(1e-6, 1) / 5,
       [](Run &r) { return JumpCase(r, 1, false, 1e3); });
   Add(cases, "jumps", "force, 1 s, TSEvent, restart", position, smooth, [](Run &r) {

@@ -1,4 +1,5 @@
-/* Application functions that fail now and then or for good, bodies that leave the range of what acts on them. */
+/* Application functions that fail now and then or permanently; bodies that leave the range in which their elements are
+   defined */
 #ifndef HHTDAE_BENCH_STABILITY_FAULTS_H
 #define HHTDAE_BENCH_STABILITY_FAULTS_H
 
@@ -11,9 +12,9 @@ namespace hhtstab
 /* ---- application functions ---- */
 
 struct Spoiled : hhtex::Pendulum {
-  int         every; /* this call is spoiled; 0: all from t = 0.5 on */
+  int         every; /* every so many calls are spoiled; 0: all calls from t = 0.5 on */
   double      value;
-  bool        matrix; /* the Jacobian in place of the residual */
+  bool        matrix; /* spoils the Jacobian instead of the residual */
   mutable int calls = 0;
   Spoiled(int n, double with, bool in_matrix) : Pendulum(-60, 1, 2), every(n), value(with), matrix(in_matrix) {}
   bool now(double t) const { return every ? t > 0.1 && ++calls % every == 0 : t > 0.5; }
@@ -38,7 +39,7 @@ inline PetscErrorCode SpoiledCase(Run &run, int every, double value, bool matrix
   PetscFunctionReturn(0);
 }
 
-/* SNESSetFunctionDomainError() in front of the application's residual */
+/* Calls SNESSetFunctionDomainError() before the application's residual */
 struct OutsideDomain {
   TSI2Function inner;
   void        *ctx;
@@ -75,7 +76,7 @@ inline PetscErrorCode DomainCase(Run &run, int every)
   PetscFunctionReturn(code);
 }
 
-/* A user's force in a scene: -4 x, and not a number in every `every`-th evaluation */
+/* A user's force in a scene: -4 x, but NaN in every `every`-th evaluation */
 inline PetscErrorCode ForceCase(Run &run, int every)
 {
   using namespace hhtdae;
@@ -134,7 +135,7 @@ inline void AddFaults(Cases &cases)
 
 /* ---- out of range ---- */
 
-/* A ball let go beside a box falls past it */
+/* A ball released beside a box falls past it */
 inline PetscErrorCode BesideTheBox(Run &run)
 {
   using namespace hhtdae;
@@ -155,7 +156,7 @@ inline PetscErrorCode BesideTheBox(Run &run)
   PetscFunctionReturn(0);
 }
 
-/* A ball that starts deep below a plane is shot out: energy */
+/* A ball that starts deep below a plane is thrown out; judged by energy */
 inline PetscErrorCode DeepBelow(Run &run, double depth)
 {
   using namespace hhtdae;
@@ -181,8 +182,8 @@ inline PetscErrorCode DeepBelow(Run &run, double depth)
   PetscFunctionReturn(0);
 }
 
-/* A slide driven by a spline through (0, 0), (1, 1), (2, 0), long after its last point: it goes on at the last slope,
- * -1.5 */
+/* A slide driven by a spline through (0, 0), (1, 1), (2, 0), far beyond its last point: the spline continues with the
+   last slope, -1.5 */
 inline PetscErrorCode BeyondSpline(Run &run)
 {
   using namespace hhtdae;
@@ -202,7 +203,7 @@ inline PetscErrorCode BeyondSpline(Run &run)
   PetscFunctionReturn(0);
 }
 
-/* A slider driven out of the reach of crank and rod, which is 2 at t = 2 */
+/* A slider is driven out of the reach of crank and rod, which is reached at t = 2 */
 inline PetscErrorCode OutOfReach(Run &run)
 {
   using namespace hhtdae;
@@ -235,7 +236,7 @@ inline PetscErrorCode OutOfReach(Run &run)
   PetscFunctionReturn(0);
 }
 
-/* A bead slides along an open curve, a straight line of 1 m, and past its end */
+/* A bead slides along an open curve, a straight line of 1 m, and beyond its end */
 inline PetscErrorCode BeyondCurve(Run &run)
 {
   using namespace hhtdae;
@@ -258,7 +259,7 @@ inline PetscErrorCode BeyondCurve(Run &run)
   PetscFunctionReturn(0);
 }
 
-/* A mass on a spring that is pressed through its own anchor, where the spring has no direction */
+/* A mass passes through the anchor of its own spring, where the direction of the spring is undefined */
 inline PetscErrorCode ThroughTheAnchor(Run &run)
 {
   using namespace hhtdae;
@@ -271,7 +272,7 @@ inline PetscErrorCode ThroughTheAnchor(Run &run)
   const Marker m = scene.marker(scene.add("mass", mass));
   scene.add("spring", SpringDamper{m, scene.marker(scene.ground()), w * w, 0, 1});
   for (int c = 0; c < 2; c++) scene.channel("", Measure::displacement(m, c));
-  /* 1 - v0/w sin(w t) until it is 0; there the speed is v1, and beyond the same with sides changed */
+  /* 1 - v0/w sin(w t) until it is 0; there the velocity is v1, and the motion beyond is the mirror image */
   const double t1 = std::asin(w / v0) / w, v1 = v0 * std::cos(w * t1);
   PetscCall(RunScene(run, scene, 2.2, 1e-6, 0.01, [&](double t, const std::vector<double> &c) {
     const double s = t - t1, back = (PETSC_PI + 2 * std::asin(w / std::sqrt(v1 * v1 + w * w))) / w;

@@ -14,14 +14,14 @@ namespace hhtstab
 
 using Array = std::vector<double>;
 
-/* A TS of a problem, and a look at every accepted step */
+/* The TS of a problem, with a function that is called after every accepted step */
 class ProblemRun
 {
 public:
   TS                                                              ts = nullptr;
   Vec                                                             U = nullptr, V = nullptr;
   std::function<void(double t, const double *u, const double *v)> look;
-  std::function<PetscErrorCode(TS)>                               also; /* called with look */
+  std::function<PetscErrorCode(TS)>                               also; /* called in addition to `look` */
 
   explicit ProblemRun(const hhtex::Problem &p) : problem_(p) {}
   ~ProblemRun()
@@ -36,7 +36,7 @@ public:
   {
     PetscFunctionBegin;
     PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_SELF, problem_, &ts, &U, &V));
-    PetscCall(TSSetTimeStep(ts, 0.1)); /* before the type PETSc's default, not set by anybody: the integrator chooses the first step */
+    PetscCall(TSSetTimeStep(ts, 0.1)); /* set before the type it does not count as set by the user: the first step is chosen */
     PetscCall(TSSetType(ts, TSHHT3));
     PetscCall(run.prepare(ts, tolerance));
     if (fixed_h > 0) PetscCall(Run::fixSteps(ts, fixed_h));
@@ -65,7 +65,7 @@ private:
   }
 };
 
-/* Largest errors against the problem's reference, at some 100 times of the run and at its end */
+/* Largest errors against the problem's reference, at about 100 times of the run and at its end */
 struct AgainstReference {
   const hhtex::Problem &problem;
   Array                 u, v, a;
@@ -80,7 +80,7 @@ struct AgainstReference {
     if (!problem.reference(t, u.data(), v.data(), a.data())) return;
     for (PetscInt i = 0; i < problem.n; i++) {
       const bool multiplier = problem.role[i] == TSHHT3_HOLONOMIC || problem.role[i] == TSHHT3_NONHOLONOMIC;
-      if (std::isnan(u[i]) || (multiplier && t == problem.t0)) continue; /* multipliers of the start are not given */
+      if (std::isnan(u[i]) || (multiplier && t == problem.t0)) continue; /* initial multipliers are not given */
       if (multiplier) {
         hhtex::Widen(lambda, x[i], u[i]);
         scale = std::fmax(scale, std::fabs(u[i]));
@@ -93,7 +93,7 @@ struct AgainstReference {
   double multipliers() const { return scale > 0 ? lambda / scale : 0; }
 };
 
-/* Positions of a problem with a reference, under error control: the figure of many cases */
+/* Error of the positions of a problem with a reference, under error control: the figure of many cases */
 inline PetscErrorCode ErrorOf(Run &run, const hhtex::Problem &p, double tolerance)
 {
   ProblemRun       r(p);
@@ -107,7 +107,7 @@ inline PetscErrorCode ErrorOf(Run &run, const hhtex::Problem &p, double toleranc
   PetscFunctionReturn(code);
 }
 
-/* A scene until `end`: look(t, channels) at the multiples of dt */
+/* Runs a scene until `end` and calls look(t, channels) at the multiples of dt */
 class SceneRun
 {
 public:
@@ -139,7 +139,7 @@ private:
   hhtdae::Scene &scene_;
 };
 
-/* create() and solve() where nothing is to be done in between */
+/* create() and solve() without anything in between */
 inline PetscErrorCode RunScene(Run &run, hhtdae::Scene &scene, double end, double tolerance, double dt,
                                const hhtex::Watch::Look &look)
 {
@@ -150,14 +150,14 @@ inline PetscErrorCode RunScene(Run &run, hhtdae::Scene &scene, double end, doubl
   PetscFunctionReturn(0);
 }
 
-/* Channels of both energies, the last ones of a scene; their sum is what a conservative scene is judged by */
+/* Adds channels of both energies as the last channels of a scene; conservative scenes are judged by their sum */
 inline void EnergyChannels(hhtdae::Scene &scene)
 {
   scene.channel("kinetic", hhtdae::Measure::kineticEnergy(), "J");
   scene.channel("potential", hhtdae::Measure::potentialEnergy(), "J");
 }
 
-/* Drift of the energy over the largest kinetic energy so far */
+/* Drift of the energy relative to the largest kinetic energy so far */
 struct EnergyDrift {
   double start = 0, drift = 0, largest = 0;
   bool   begun = false;

@@ -1,7 +1,5 @@
-/*
-  Runs a case in a process of its own: a crash, a hang and a leak stay there. The outcome comes back through a pipe;
-  what comes back incomplete is a crash, and what does not come back before the deadline is ended.
-*/
+/* Runs a case in a process of its own, so that a crash, a hang or a leak affects only this case. The outcome comes
+   back through a pipe; an incomplete outcome counts as a crash, and a process that exceeds the deadline is ended */
 #ifndef HHTDAE_BENCH_STABILITY_PROCESS_H
 #define HHTDAE_BENCH_STABILITY_PROCESS_H
 
@@ -17,7 +15,7 @@
 namespace hhtstab
 {
 
-/* Lines for the report that a case produces besides its outcome */
+/* Lines for the report that a case writes in addition to its outcome */
 class ChildReport
 {
 public:
@@ -28,7 +26,7 @@ private:
   std::string text_;
 };
 
-/* All that comes through the pipe until its end or the deadline; false: deadline */
+/* Reads from the pipe until its end or the deadline; false: deadline */
 inline bool ReadAll(int fd, double seconds, std::string *data)
 {
   using Clock    = std::chrono::steady_clock;
@@ -69,7 +67,7 @@ inline PetscErrorCode RunApart(const Case &c, TSHHT3Form form, Outcome *out, Chi
     const std::size_t before = report->text().size();
     close(fd[0]);
     PetscPopSignalHandler();
-    for (int s : {SIGSEGV, SIGFPE, SIGABRT, SIGBUS, SIGILL}) std::signal(s, SIG_DFL); /* a crash is to be seen as one */
+    for (int s : {SIGSEGV, SIGFPE, SIGABRT, SIGBUS, SIGILL}) std::signal(s, SIG_DFL); /* crashes must not be caught by PETSc */
     RunCase(c, form, *out);
     WriteAll(fd[1], out, sizeof *out);
     WriteAll(fd[1], report->text().data() + before, report->text().size() - before);

@@ -1,8 +1,6 @@
-/*
-  Stiff elements that let go, and Jacobians that are wrong: cases in which corrections are small though the equations of motion
-  are far from being satisfied. What holds a body makes the Newton matrix stiff; when it is gone, or was never there, the
-  matrix turns any imbalance of forces into a tiny correction.
-*/
+/* Stiff elements that are released, and wrong Jacobians: cases in which corrections are small although the equations
+   of motion are far from being satisfied. The element that holds a body makes the Newton matrix stiff; once it is
+   gone, or if it was never there, the matrix turns any imbalance of forces into a tiny correction */
 #ifndef HHTDAE_BENCH_STABILITY_RELEASE_H
 #define HHTDAE_BENCH_STABILITY_RELEASE_H
 
@@ -18,21 +16,20 @@ enum class Hold {
   Spring,   /* s y */
   Damper,   /* s y' */
   Bushing,  /* s y + s y'/1000 */
-  Brake,    /* s/1000 tanh(1000 y'), of slope s */
-  Contact,  /* s y + s y'/1000 while it pushes: lets go by state under a load that grows to the weight at t = 0.5 */
-  Friction, /* sticks with slope s up to 10 N: slips by state under a load of 20 t */
+  Brake,    /* s/1000 tanh(1000 y'), with the slope s at y' = 0 */
+  Contact,  /* s y + s y'/1000 while it pushes: released by state, under a load that reaches the weight at t = 0.5 */
+  Friction, /* sticks with the slope s up to 10 N: slips by state under a load of 20 t */
 };
 
-/*
-  A block of 1 kg on a vertical guide (coordinates x, y, a multiplier for x = 0) that something holds until t = 0.5. With
-  company: a pendulum that swings, and a mass on a spring of 1e8 N/m that stays, so that the imbalance is not alone.
-*/
+/* A block of 1 kg on a vertical guide (coordinates x, y, a multiplier for x = 0) held by a stiff element until t =
+   0.5. With company: also a swinging pendulum, and a mass on a spring of 1e8 N/m that remains, so that the imbalance
+   is not the only large entry */
 struct Release : hhtex::Problem {
   const Hold   hold;
   const double s;
   const bool   company;
-  const bool   as_force; /* what holds is a force state: its stiffness does not stand in the block's own row */
-  const double g = 9.81, until = 0.5 + 1e-9, kept = 1e8; /* the last held step may end at 0.5 but for rounding */
+  const bool   as_force; /* the holding force is a force state: its stiffness is not in the block's own row */
+  const double g = 9.81, until = 0.5 + 1e-9, kept = 1e8; /* the last step with the element may end at 0.5 except for rounding */
 
   Release(Hold hold_, double strength, bool company_, bool as_force_ = false) : hold(hold_), s(strength), company(company_), as_force(as_force_)
   {
@@ -56,7 +53,7 @@ struct Release : hhtex::Problem {
       u[6] = g / kept;
     }
   }
-  /* Force on the block besides its weight, upwards, and its derivatives by y and y' */
+  /* Force on the block in addition to its weight, upwards, and its derivatives with respect to y and y' */
   void force(double t, double y, double v, double &f, double &k, double &c) const
   {
     f = k = c = 0;
@@ -103,7 +100,7 @@ struct Release : hhtex::Problem {
     force(t, u[1], v[1], f, k, c);
     J.add(0, 0, sa);
     J.add(0, 2, 1);
-    const PetscInt row = as_force ? n - 1 : 1; /* of the force's derivatives */
+    const PetscInt row = as_force ? n - 1 : 1; /* row of the force's derivatives */
     if (as_force) {
       J.add(1, 1, sa);
       J.add(1, row, -1);
@@ -119,7 +116,7 @@ struct Release : hhtex::Problem {
     }
     J.add(6, 6, sa + kept);
   }
-  /* Height of the block: what it loses while it is held is below the figures allowed */
+  /* Height of the block; what it falls while held is below the accepted errors */
   double height(double t) const
   {
     const double d = std::max(0., t - until);
@@ -167,7 +164,9 @@ inline void AddReleases(Cases &cases)
                {Hold::Brake, "brake"},   {Hold::Contact, "contact"}, {Hold::Friction, "friction"}};
   const struct {
     const char *name;
-    double      eps, h, accept; /* a step over the jump of the acceleration misses a velocity of up to g h; error control lets h = sqrt(eps/(k g)) pass */
+    /* A step over the jump of the acceleration misses a velocity of up to g h; error control permits h = sqrt(eps/(k
+       g)) */
+    double      eps, h, accept;
   } steps[] = {{"1e-3", 1e-3, 0, 0.12}, {"1e-6", 1e-6, 0, 4e-3}, {"1e-3, h<1e-3", 1e-3, -1e-3, 5e-3},
                {"1e-5, h=1e-3", 1e-5, 1e-3, 5e-3}, {"1e-5, h=1e-4", 1e-5, 1e-4, 5e-4}};
   for (const auto &hold : holds)
@@ -176,16 +175,17 @@ inline void AddReleases(Cases &cases)
         for (int with : {0, 1, 2}) {
           const bool company = with == 1, as_force = with == 2;
           const double s = std::pow(10, d);
-          /* Beyond, friction slips by 1e-7 m/s: Newton's method finds its way through so sharp a bend in tiny steps only. And a contact
-             of 1e10 N/m bounces by what the tolerance lets it penetrate. */
+          /* Larger s are left out: friction would slip at 1e-7 m/s, and Newton's method passes so sharp a bend only
+             with tiny steps; a contact of 1e10 N/m rebounds by an amount that depends on the permitted penetration */
           if (s > (hold.hold == Hold::Contact ? 1e8 : 1e12)) continue;
-          /* a soft hold moves by itself: slips, swings, or slides at its steady speed */
-          const double soft = hold.hold == Hold::Brake ? (d < 5 ? -1 : 0) : hold.hold == Hold::Friction ? 20 / s : d < 4 ? 0.15 : d < 6 ? 1e-3 : 0; /* swings by its static deflection */
+          /* displacement of a soft element before its release: it slips, oscillates, or slides steadily */
+          const double soft = hold.hold == Hold::Brake ? (d < 5 ? -1 : 0) : hold.hold == Hold::Friction ? 20 / s : d < 4 ? 0.15 : d < 6 ? 1e-3 : 0; /* oscillates */
           if (soft < 0) continue;
           Case &c = Add(cases, "releases", std::string(hold.name) + Name(" %.0e, ", s) + step.name + (company ? ", company" : as_force ? ", force state" : ""),
               "height, exact", step.accept + soft,
               [=](Run &r) { return ReleaseCase(r, Release(hold.hold, s, company, as_force), step.eps, step.h); });
-          if (hold.hold == Hold::Brake && s > 1e11) c.orFail("No "); /* 1e9 N held by a sliding of 1e-11 m/s: rounding may end it, with a word */
+          /* 1e9 N held by a sliding velocity of 1e-11 m/s: the run may end because of rounding, with an error */
+          if (hold.hold == Hold::Brake && s > 1e11) c.orFail("No ");
           if (d == 8 && step.h <= 0) c.test();
         }
 }
@@ -194,7 +194,7 @@ inline void AddReleases(Cases &cases)
 
 enum class Wrong { Stiff, Damped, Soft, Row, Old };
 
-/* A problem with a Jacobian that is not its own */
+/* A problem with a distorted Jacobian */
 struct Distorted : hhtex::Problem {
   const hhtex::Problem &right;
   const Wrong           wrong;
@@ -239,7 +239,7 @@ inline PetscErrorCode WrongCase(Run &run, bool spring, Wrong wrong, double by, d
   PetscCall(r.create(run, eps, h));
   r.look                    = [&](double t, const double *u, const double *v) { error(t, u, v); };
   const PetscErrorCode code = run.solve(r.ts);
-  run.judge(code ? 0 : error.q); /* nothing is promised of the steps before the error */
+  run.judge(code ? 0 : error.q); /* nothing is required of the steps before the error */
   PetscFunctionReturn(code);
 }
 
@@ -257,11 +257,11 @@ inline void AddWrongJacobians(Cases &cases)
     for (const auto &k : kinds)
       for (double eps : {1e-3, 1e-6})
         for (double h : {0., 1e-3}) {
-          if (h > 0 && k.by >= 1e10) continue; /* ends in 1e7 steps of 1e-7 s, or in time: no case for a table */
+          if (h > 0 && k.by >= 1e10) continue; /* would end after 1e7 steps of 1e-7 s, or at the deadline: not suitable for a table */
           Case &c = Add(cases, "wrong Jacobians", std::string(spring ? "spring pendulum, " : "pendulum, ") + k.name + Name(", %.0e", eps) + (h > 0 ? ", h=1e-3" : ""),
                         "position, exact", h > 0 ? 1e-2 : std::max(40 * eps, 4e-4), [=](Run &r) { return WrongCase(r, spring, k.wrong, k.by, eps, h); });
           if (k.by == 1e6 && !(h > 0)) c.test();
-          c.orFail("No "); /* step from t succeeded, or consistent accelerations were found */
+          c.orFail("No "); /* the message is "No step from t succeeded" or "No consistent accelerations were found" */
         }
 }
 

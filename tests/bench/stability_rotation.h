@@ -1,4 +1,4 @@
-/* Fast spin, attitudes where Euler angles are singular, bodies that tumble for long. */
+/* Fast spin, attitudes at which Euler angles are singular, bodies that tumble for a long time */
 #ifndef HHTDAE_BENCH_STABILITY_ROTATION_H
 #define HHTDAE_BENCH_STABILITY_ROTATION_H
 
@@ -7,7 +7,7 @@
 namespace hhtstab
 {
 
-/* A rotor on a hinge, its axis along the space z axis, where Euler angles begin at their singularity */
+/* A rotor on a hinge along the space z axis, where Euler angles are singular at the start */
 inline PetscErrorCode RotorCase(Run &run, double spin, bool count)
 {
   using namespace hhtdae;
@@ -28,8 +28,8 @@ inline PetscErrorCode RotorCase(Run &run, double spin, bool count)
   PetscFunctionReturn(0);
 }
 
-/* A free body, from an attitude: directions of its axes; or, where these are unstable, the vector of its angular
- * momentum */
+/* A free body in an arbitrary attitude, judged by the directions of its axes or, where these are unstable, by its
+   angular momentum */
 inline PetscErrorCode FreeCase(Run &run, const hhtdae::Vector3 &J, const hhtdae::Vector3 &spin, double tilt, double end,
                                double tolerance, bool momentum = false)
 {
@@ -58,8 +58,9 @@ inline PetscErrorCode FreeCase(Run &run, const hhtdae::Vector3 &J, const hhtdae:
   PetscFunctionReturn(0);
 }
 
-/* A fast top in slow regular precession, its nutation far above what the steps resolve: part of the precession's way. At 1e5 rad/s that way is
-   2 mm long, and 1e-2 of it are 20 times the tolerance; where a run ends below depends on the last digits. */
+/* A fast top in slow regular precession, whose nutation is far faster than the steps resolve; judged by the error
+   relative to the path of precession. At 1e5 rad/s this path is 2 mm long, and 1e-2 of it is 20 times the tolerance;
+   the smaller error with which a run ends depends on the last digits */
 inline PetscErrorCode PrecessionCase(Run &run, double spin)
 {
   using namespace hhtdae;
@@ -87,7 +88,7 @@ inline PetscErrorCode PrecessionCase(Run &run, double spin)
   PetscFunctionReturn(0);
 }
 
-/* A body with three moments of inertia on a ball joint, turning over and over: energy */
+/* A body with three different moments of inertia on a ball joint, turning over repeatedly; judged by energy */
 inline PetscErrorCode TumbleCase(Run &run, double turns)
 {
   using namespace hhtdae;

@@ -1,4 +1,4 @@
-/* Starts that violate the constraints, steps from 1e-12 to 1, tolerances from 1e-2 to 1e-12, a million steps. */
+/* Starts that violate the constraints; steps from 1e-12 to 1; tolerances from 1e-2 to 1e-12; a million steps */
 #ifndef HHTDAE_BENCH_STABILITY_START_H
 #define HHTDAE_BENCH_STABILITY_START_H
 
@@ -9,8 +9,7 @@ namespace hhtstab
 
 /* ---- inconsistent starts ---- */
 
-/* A pendulum that starts too long and with a velocity along its rod; what it is compared with starts at the nearest
- * consistent state */
+/* A pendulum that starts too long and with a velocity along its rod; the reference starts at the nearest consistent state */
 struct Displaced : hhtex::Pendulum {
   const double stretch, along;
   Displaced(double longer, double speed) : Pendulum(-60, 1, 2), stretch(longer), along(speed) {}
@@ -38,7 +37,7 @@ inline PetscErrorCode DisplacedCase(Run &run, double stretch, double along, TSHH
   PetscFunctionReturn(code);
 }
 
-/* A rod on a hinge that it does not reach by `gap` */
+/* A rod on a hinge from which it is apart by `gap` */
 inline PetscErrorCode GapCase(Run &run, double gap, hhtdae::Assembly assembly)
 {
   using namespace hhtdae;
@@ -93,11 +92,10 @@ inline void AddStarts(Cases &cases)
 
 /* ---- steps and tolerances ---- */
 
-/*
-  Steps of one length, in units of what the method promises: positions within (h w)^2 w t plus rounding, velocities w
-  times that, multipliers of short steps within 5 %. Steps of a tenth of a swing and more resolve nothing: there the rod
-  keeps its length to 1e-6 and the energy that it gains stays below that of a turn.
-*/
+/* Steps of constant length; the figure is in units of what the method promises: positions within (h w)^2 w t plus
+   rounding, velocities w times that, multipliers of short steps within 5 %. Steps of a tenth of a period and longer do
+   not resolve the motion: there the rod must keep its length to 1e-6, and the energy that it gains must stay below
+   that of a full turn */
 inline PetscErrorCode FixedStepCase(Run &run, double h)
 {
   const double          w = 3.5, steps = h > 1e-2 ? 200 : 1000;
@@ -165,7 +163,7 @@ inline void AddSteps(Cases &cases)
   }
   for (double h : {1e-12, 1e-6, 1., 1e3})
     Add(cases, "steps", Name("first h=%.0e", h), "position, exact", 2e-3, [h](Run &r) { return FirstStepCase(r, h); });
-  for (int d = -2; d >= -12; d--) { /* of second order: global errors like eps^(2/3) */
+  for (int d = -2; d >= -12; d--) { /* of second order: global errors proportional to eps^(2/3) */
     const double eps = std::pow(10, d), way5 = Allowed(eps, 5), way8 = Allowed(eps, 8);
     Add(cases, "tolerances", Name("pendulum eps=%.0e", eps), "position, exact", way5,
         [eps](Run &r) { return ToleranceCase(r, eps); });
@@ -177,7 +175,7 @@ inline void AddSteps(Cases &cases)
 
 /* ---- a million steps ---- */
 
-/* Two masses on a rod, thrown: position and attitude are known for ever, nothing is lost but what the method damps */
+/* Two masses on a rod, thrown: position and attitude are known at any time, and the method's damping is the only loss */
 struct Dumbbell : hhtex::Problem {
   static constexpr double m1 = 1, m2 = 2, spin = 1, throw_x = 1e-3, throw_y = 2e-3;
   explicit Dumbbell(double end)
@@ -225,8 +223,8 @@ struct Drifts {
   double position = 0, velocity = 0, acceleration = 0, energy = 0, momentum = 0, angular = 0;
 };
 
-/* Constraints at all three levels every 1000 steps, and what mechanics conserves; the figure is the worst over its own
- * bound */
+/* Constraints on all three levels every 1000 steps, and conserved quantities; the figure is the worst one relative to
+   its own bound */
 inline PetscErrorCode MillionDumbbell(Run &run)
 {
   const double   h     = 1e-3;

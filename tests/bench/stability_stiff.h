@@ -1,4 +1,4 @@
-/* Stiff springs and bushings, modes far above the motion, ratios of masses, links almost without mass. */
+/* Stiff springs and bushings, modes far faster than the motion, mass ratios, links almost without mass */
 #ifndef HHTDAE_BENCH_STABILITY_STIFF_H
 #define HHTDAE_BENCH_STABILITY_STIFF_H
 
@@ -12,7 +12,8 @@ namespace hhtstab
 
 /* ---- springs ---- */
 
-/* A mass on a spring of k N/m, let go horizontally: exact for what can be resolved, else the rigid rod, 100/k away */
+/* A mass on a spring of k N/m, released from the horizontal: exact solution as far as it can be resolved, otherwise
+   the rigid rod, whose distance is 100/k */
 inline PetscErrorCode SpringCase(Run &run, double k)
 {
   const hhtex::SpringPendulum p(k, 2);
@@ -33,7 +34,7 @@ inline PetscErrorCode SpringCase(Run &run, double k)
   PetscFunctionReturn(0);
 }
 
-/* A rod hung by a bushing that holds its place alone: a physical pendulum but for mg/k */
+/* A rod held by a bushing at one point: a physical pendulum except for a deflection mg/k */
 inline PetscErrorCode BushingCase(Run &run, double k, double eps)
 {
   using namespace hhtdae;
@@ -70,7 +71,7 @@ inline void AddSprings(Cases &cases)
   for (double k : {1e6, 1e10, 1e14})
     Add(cases, "springs", Name("bushing k=%.0e", k), "position, rigid joint", Allowed(1e-6, 3.5),
         [k](Run &r) { return BushingCase(r, k, 1e-6); });
-  /* the stiffest where the error test forgives most: an energy of k eps^2/2 is 5e5 times the pendulum's */
+  /* the stiffest bushing where the error test permits most: an energy of k eps^2/2 is 5e5 times that of the pendulum */
   for (double eps : {1e-4, 1e-5})
     Add(cases, "springs", Name("bushing k=1e+14 eps=%.0e", eps), "position, rigid joint", Allowed(eps, 3.5),
         [eps](Run &r) { return BushingCase(r, 1e14, eps); })
@@ -79,11 +80,10 @@ inline void AddSprings(Cases &cases)
 
 /* ---- modes ---- */
 
-/*
-  A mode of 1e7 Hz beside one of 1 rad/s, both excited, at h omega from 1e-3 to 1e6: 2000 fixed steps. In units of what
-  the method promises: the slow one within (h)^2 t, the fast one within (h omega)^2 omega t while it is resolved; above
-  h omega = 0.1 it never exceeds twice its start, and from h omega = 1 on it is damped away at the end.
-*/
+/* A mode of 1e7 Hz beside one of 1 rad/s, both excited, at h omega from 1e-3 to 1e6, in 2000 fixed steps. The figure
+   is in units of what the method promises: the slow mode within h^2 t, the fast one within (h omega)^2 omega t while
+   it is resolved; above h omega = 0.1 the fast mode never exceeds twice its initial amplitude, and from h omega = 1 on
+   it is damped out at the end */
 inline PetscErrorCode ModeCase(Run &run, double h_omega)
 {
   const double             w = 2 * PETSC_PI * 1e7, h = h_omega / w;
@@ -105,7 +105,7 @@ inline PetscErrorCode ModeCase(Run &run, double h_omega)
   PetscFunctionReturn(0);
 }
 
-/* A body with modes of 0.1 to 10 MHz that tumbles: a rigid one to 1e-10. They must not set the step. */
+/* A tumbling body with modes of 0.1 to 10 MHz, which is a rigid one to 1e-10; the modes must not determine the step */
 inline PetscErrorCode ModalCase(Run &run)
 {
   using namespace hhtdae;
@@ -124,7 +124,7 @@ inline PetscErrorCode ModalCase(Run &run)
   model->first.setZero(3, modes);
   for (int c = 0; c < 3; c++) {
     model->moment[c].setZero(3, modes);
-    model->moment[c].row(c).setConstant(0.3); /* centrifugal forces excite them all */
+    model->moment[c].row(c).setConstant(0.3); /* centrifugal forces excite all of them */
     model->quadratic[c]     = Eigen::MatrixXd::Identity(modes, modes) / 3;
     model->quadratic[3 + c] = Eigen::MatrixXd::Zero(modes, modes);
   }
@@ -158,7 +158,7 @@ inline void AddModes(Cases &cases)
 
 /* ---- masses ---- */
 
-/* Two masses on massless rods, straight at the start, in angles from the vertical: the reference */
+/* Reference: two masses on massless rods, stretched at the start, in angles from the vertical */
 struct TwoMasses {
   double                       ratio; /* m2/m1 */
   mutable hhtex::Extrapolation solution;
@@ -178,7 +178,7 @@ struct TwoMasses {
     f[3] =
         (s * ((1 + r) * y[2] * y[2] + r * c * y[3] * y[3]) + g * (1 + r) * (c * std::sin(y[0]) - std::sin(y[1]))) / den;
   }
-  /* beyond 1e5 the light mass stays on the straight line between pivot and heavy one, to 1/ratio */
+  /* beyond a ratio of 1e5 the light mass stays on the straight line between the pivot and the heavy mass, to 1/ratio */
   void at(double t, double x[4]) const
   {
     long double a, b;
@@ -219,7 +219,7 @@ inline PetscErrorCode MassCase(Run &run, double ratio)
   PetscFunctionReturn(0);
 }
 
-/* Three rods on ball joints in space, the middle one almost without mass between heavy ones: energy */
+/* Three rods on ball joints in space, of which the middle one is almost massless; judged by energy */
 inline PetscErrorCode HeavyLightHeavy(Run &run, double ratio)
 {
   using namespace hhtdae;
@@ -232,7 +232,7 @@ inline PetscErrorCode HeavyLightHeavy(Run &run, double ratio)
     rod.mass             = k == 1 ? 1 : ratio;
     rod.inertia          = rod.mass * Matrix3(Vector3(1e-2, 1. / 12, 1. / 12).asDiagonal());
     rod.position         = {k + 0.5, 0, 0};
-    rod.angular_velocity = {0, 0.4, 0}; /* all as one: out of the plane */
+    rod.angular_velocity = {0, 0.4, 0}; /* all alike: out of the plane */
     rod.velocity         = rod.angular_velocity.cross(rod.position);
     const Body b         = scene.add("rod " + std::to_string(k), rod);
     scene.add("joint " + std::to_string(k), Spherical{scene.marker(b, {-0.5, 0, 0}), last});
@@ -247,11 +247,11 @@ inline PetscErrorCode HeavyLightHeavy(Run &run, double ratio)
   PetscFunctionReturn(0);
 }
 
-/* ---- slider-crank: crank of r, rod of 1, masses 1, rod, 1; one degree of freedom by hand ---- */
+/* ---- slider-crank: crank of length r, rod of length 1, masses 1, rod, 1; equation of motion in one coordinate by hand ---- */
 
 struct SliderCrankByHand {
   long double r, rod;
-  bool equal; /* crank as long as the rod: its angle is minus that of the crank on the branch that inertia takes */
+  bool equal; /* crank as long as the rod: the rod's angle is minus that of the crank on the branch that inertia selects */
   mutable hhtex::Extrapolation solution;
 
   SliderCrankByHand(double crank, double rod_mass, double angle, double speed)
@@ -263,7 +263,7 @@ struct SliderCrankByHand {
   SliderCrankByHand(const SliderCrankByHand &) = delete;
 
   struct Place {
-    double angle, rod, slider; /* of the crank, of the rod, of the slider along x */
+    double angle, rod, slider; /* angle of the crank, angle of the rod, position of the slider along x */
   };
   Place at(double t) const
   {
@@ -276,13 +276,13 @@ private:
   void rates(const long double *y, long double *f) const
   {
     const long double s = std::sin(y[0]), c = std::cos(y[0]), g = 9.81L;
-    long double       sb = -s, cb = c, b1 = -1, b2 = 0; /* the rod's angle and its derivatives by a */
+    long double       sb = -s, cb = c, b1 = -1, b2 = 0; /* the rod's angle and its derivatives with respect to a */
     if (!equal) {
       sb = -r * s, cb = std::sqrt(1 - sb * sb);
       b1 = -r * c / cb, b2 = (r * s + sb * b1 * b1) / cb;
     }
     const long double X1 = -r * s - sb * b1, X2 = -r * c - cb * b1 * b1 - sb * b2;           /* slider */
-    const long double x1 = -r * s - sb * b1 / 2, x2 = -r * c - (cb * b1 * b1 + sb * b2) / 2; /* middle of the rod */
+    const long double x1 = -r * s - sb * b1 / 2, x2 = -r * c - (cb * b1 * b1 + sb * b2) / 2; /* centre of the rod */
     const long double y1 = r * c + cb * b1 / 2, y2 = -r * s + (cb * b2 - sb * b1 * b1) / 2;
     const long double m    = r * r / 3 + X1 * X1 + rod * (x1 * x1 + y1 * y1 + b1 * b1 / 12);
     const long double half = X1 * X2 + rod * (x1 * x2 + y1 * y2 + b1 * b2 / 12);

@@ -49,7 +49,7 @@ private:
     Outcome    o;
     bool       passed;
 
-    /* The first line of what PETSc said, or what the case has to say */
+    /* The first line of PETSc's message, or the case's own remark */
     std::string remark() const
     {
       const std::string all = o.message[0] ? o.message : o.note;

@@ -29,7 +29,7 @@ static double Milliseconds(clockid_t clock)
   return 1e3 * (double)t.tv_sec + 1e-6 * (double)t.tv_nsec;
 }
 
-/* Time since the last call, under the name of what has been done in it */
+/* Prints the time since the last call under the name of what has been done meanwhile */
 static void Lap(const char *done)
 {
   static double cpu = 0, clock = 0;

@@ -30,7 +30,8 @@ static char help[] = "Error against run time: both forms of hhtdae, PETSc's ALPH
 
 using namespace wp;
 
-/* Threads of the BLAS would spin, and their time would count. The library reads its environment when it is loaded. */
+/* Several BLAS threads would waste time by busy waiting, which would be counted; OpenBLAS reads its environment only
+   when it is loaded, so the program is executed again */
 static void runSingleThreaded(char **argv)
 {
   if (getenv("OMP_NUM_THREADS") && getenv("OPENBLAS_NUM_THREADS")) return;
@@ -39,7 +40,7 @@ static void runSingleThreaded(char **argv)
   execv("/proc/self/exe", argv);
 }
 
-/* Keeps what -name lists, in that order */
+/* Keeps the entries that the option -name lists, in that order */
 template <class T> static PetscErrorCode Select(const char *option, std::vector<T> &list)
 {
   char     *names[100];
@@ -62,7 +63,7 @@ template <class T> static PetscErrorCode Select(const char *option, std::vector<
 
 static bool IsHeldOut(const Case &c) { return c.name.rfind("held:", 0) == 0; }
 
-/* Likewise, with names for all of one kind */
+/* The same for problems, with names for all of one kind */
 static PetscErrorCode SelectCases(std::vector<Case> &list)
 {
   char      name[16];
@@ -104,7 +105,7 @@ static PetscErrorCode ReadGrid(Grid &grid)
   PetscFunctionReturn(0);
 }
 
-/* A solver that has reached the limit is not tried at a tighter tolerance. */
+/* A solver that has reached the limit of time is not tried at smaller tolerances */
 static const char *const gaveUp = "not tried: reached the limit at a looser tolerance";
 
 static bool HasGivenUp(const Curve &c)
@@ -114,13 +115,13 @@ static bool HasGivenUp(const Curve &c)
   return last == tooLong || last == gaveUp;
 }
 
-/* A failure is not repeated, and what takes long less often */
+/* A failed run is not repeated, and long runs are repeated less often */
 static bool Enough(const Run &run, size_t repeats)
 {
   return repeats > 0 && (!run.failure.empty() || run.time * (double)repeats > 0.15);
 }
 
-/* A short run is made twice: the first one finds the caches full of another solver */
+/* A short run is made twice, because during the first one the caches contain the data of another solver */
 static PetscErrorCode RunOnce(const Solver &solver, const Case &c, const Problem &p, const Reference &ref, double eps,
                               const Limits &limits, Run *run)
 {
@@ -130,7 +131,7 @@ static PetscErrorCode RunOnce(const Solver &solver, const Case &c, const Problem
   PetscFunctionReturn(0);
 }
 
-/* All solvers at one tolerance, in turn, as often as asked */
+/* All solvers at one tolerance, alternately, as often as asked */
 static PetscErrorCode RunTolerance(const Case &c, const Problem &p, const Reference &ref, double eps, const Grid &grid,
                                    const std::vector<Solver> &solvers, std::vector<Curve> &curves)
 {
@@ -168,7 +169,8 @@ static PetscErrorCode RunCase(const Case &c, const Problem &p, const Grid &grid,
   PetscFunctionReturn(0);
 }
 
-/* Every problem with all solvers, then with the settings to sweep; one without a reference is left out, and said so */
+/* Every problem with all solvers, then with the settings of the sweep; a problem without a reference is left out with
+   a message */
 static PetscErrorCode RunAll(Results &r, Results &sweep, const Grid &grid, const Grid &coarse)
 {
   PetscFunctionBegin;
@@ -239,7 +241,7 @@ static PetscErrorCode Report(const Results &r, const Results &sweep, PageSetting
   PetscFunctionReturn(0);
 }
 
-/* What the sweep is to be; on its own it takes all tolerances */
+/* Reads the options of the sweep; without other runs it takes all tolerances */
 static PetscErrorCode ReadSweep(Results &r, Results &sweep, const Grid &grid, Grid &coarse)
 {
   char      text[16] = "also";

@@ -1,4 +1,4 @@
-/* The problems with a reference and the solvers of the comparison. A new one is one more line here. */
+/* The problems that have a reference, and the solvers of the comparison. A new problem or solver needs one more line here */
 #ifndef WORKPRECISION_CASES_H
 #define WORKPRECISION_CASES_H
 
@@ -138,7 +138,7 @@ inline void addForeign(std::vector<Solver> &list)
 #endif
 }
 
-/* The first one is what all others are compared with: the integrator as it comes */
+/* The first solver is the one to which all others are compared: the integrator with default settings */
 inline std::vector<Solver> allSolvers()
 {
   const TSHHT3Form second = TSHHT3_FORM_SECOND_ORDER, paper = TSHHT3_FORM_PAPER;

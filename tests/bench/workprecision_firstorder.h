@@ -44,9 +44,10 @@ public:
   }
 
   PetscInt size;
-  long     extra = 0; /* evaluations of the Jacobian that a problem written for this form would not need; not counted */
+  long     extra = 0; /* evaluations of the Jacobian that a problem written in first-order form would not need; not counted */
 
-  /* Their CPU time, by that of one; after a run, as it asks the problem for its start */
+  /* Their CPU time, extrapolated from that of one evaluation; to be called after a run, because it uses the problem at
+     its start */
   double extraSeconds()
   {
     const int           n = 30;
@@ -58,7 +59,7 @@ public:
     return (double)extra * (ProcessorSeconds() - start) / n;
   }
 
-  /* Consistent start: the reference knows lambda and the accelerations at t0 wherever there is one */
+  /* Consistent start: lambda and the accelerations at t0 come from the reference, if there is one */
   void initial(const Problem &p, std::vector<double> &y, std::vector<double> &yp) const
   {
     std::vector<double> u(n_), v(n_), ur(n_), vr(n_), ar(n_);
@@ -119,7 +120,7 @@ public:
     for (PetscInt i = 0; i < size; i++) J.add(i, i, 0.);
   }
 
-  /* U and U' of the problem; derivatives of states stay zero, which nobody compares */
+  /* U and U' of the problem; derivatives of states stay zero, since they are not compared */
   void output(const double *y, double *u, double *v) const
   {
     std::copy_n(y, n_, u);
@@ -145,7 +146,7 @@ private:
   PetscInt              n_;
   bool                  stabilized_;
   std::vector<PetscInt> coordinate_, velocity_, row_; /* of q_i: v_i; of Phi_i: mu_i and its row */
-  std::vector<size_t>   phiQ_;                        /* which entries of the problem's Jacobian are Phi_q */
+  std::vector<size_t>   phiQ_;                        /* indices of those entries of the problem's Jacobian that are Phi_q */
   std::vector<double>   V_, A_, shifted_;
   Entries               gradient_, rates_;
 

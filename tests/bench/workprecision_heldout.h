@@ -1,7 +1,5 @@
-/*
-  Problems and scenes on which nothing has been tuned: the constants of the order's choice were chosen before these were first run, and are not changed for them. They are
-  judged apart (-problems heldout).
-*/
+/* Problems and scenes on which nothing was tuned: the constants of the choice of order were fixed before these were
+   first run, and are not changed because of them. They are judged separately (-problems heldout) */
 #ifndef WORKPRECISION_HELDOUT_H
 #define WORKPRECISION_HELDOUT_H
 
@@ -13,7 +11,8 @@
 namespace wp
 {
 
-/* A bridge and a trolley that start and stop smoothly, and a load that turns under a rope, as a rod of little mass on a universal joint */
+/* A bridge and a trolley that start and stop smoothly, with a load that swings on a rope, modelled as a light rod on a
+   universal joint */
 inline void AddCrane(Scene &s)
 {
   using namespace hhtdae;
@@ -46,8 +45,8 @@ inline void AddCrane(Scene &s)
   for (int c = 0; c < 3; c++) s.channel("", Measure::displacement(s.marker(L, {1, 0, 0}), c), "m");
 }
 
-/* A free rigid body that tumbles, with two panels on hinges with springs and two booms, elastic beams with masses at their ends; nothing but the booms has damping, and that is
-   little */
+/* A free tumbling rigid body with two panels on hinges with springs and two booms, elastic beams with end masses; only
+   the booms have damping, and only little */
 inline void AddSatellite(Scene &s)
 {
   using namespace hhtdae;
@@ -84,7 +83,7 @@ inline void AddSatellite(Scene &s)
     turning(tip, {0, 0, 3 * side});
     const Body M = s.add("tip" + which, tip);
     Matrix3    outwards;
-    outwards << 0, 1, 0, 0, 0, side, side, 0, 0; /* x of the beam away from the hub */
+    outwards << 0, 1, 0, 0, 0, side, side, 0, 0; /* x of the beam points away from the hub */
     Beam boom;
     boom.i    = s.markerAt(M, {0, 0, 3 * side}, outwards);
     boom.j    = s.markerAt(H, {0, 0, side}, outwards);
@@ -100,7 +99,7 @@ inline void AddSatellite(Scene &s)
   }
 }
 
-/* A rotor in two frames; the outer one is turned by a motion, a weight pulls at the inner one */
+/* A rotor in two frames; a motion rotates the outer frame, and a weight acts on the inner one */
 inline void AddGyroscope(Scene &s)
 {
   using namespace hhtdae;

@@ -22,18 +22,22 @@ namespace wp
 
 struct IDASettings {
   FirstOrder::Form form         = FirstOrder::Form::Stabilized;
-  bool             testVelocity = false; /* velocities enter the error test */
+  bool             testVelocity = false; /* whether velocities enter the error test */
   int              maxOrder     = 5;
-  PetscInt         sparseFrom   = 15;  /* unknowns; KLU from here on, where it begins to win */
-  double           looser       = 1e3; /* absolute tolerance of what is left out of the error test, which Newton's test
-                                          still looks at: with 1 it fails at small tolerances */
-  long   maxSteps  = 20000;            /* after which IDA looks whether the time is over */
-  double maxStep   = 0.;               /* largest step; 0: none */
-  double newton    = 0.; /* part of the error test at which its iteration ends, in up to ten corrections; 0: IDA's own, a third, in up to
-                            four. With that a matrix that is older than the end of a strong damper holds on to it. */
-  double firstStep = 0.; /* 0: 0.01 sqrt(eps) of the run. IDA's own is so short where velocities are tested that
-                            rounding drowns the accelerations and the first step fails. */
-  std::vector<double> part; /* of the absolute tolerance for each unknown of the problem that is tested; empty: one */
+  PetscInt         sparseFrom   = 15;  /* number of unknowns from which on KLU is used, since it is faster there */
+  /* factor of the absolute tolerance of unknowns excluded from the error test, which Newton's convergence test still
+     includes; with 1 it fails at small tolerances */
+  double           looser       = 1e3;
+  long   maxSteps  = 20000;            /* number of steps after which IDA checks the limit of time */
+  double maxStep   = 0.;               /* largest step; 0: no limit */
+  /* part of the error test at which the iteration ends, with up to ten corrections; 0: IDA's default, a third, with
+     up to four corrections. With the default a matrix from before the release of a strong damper continues to act
+     like the damper */
+  double newton    = 0.;
+  /* 0: 0.01 sqrt(eps) of the run. IDA's default is so short, where velocities are tested, that rounding dominates the
+     accelerations and the first step fails */
+  double firstStep = 0.;
+  std::vector<double> part; /* factors of the absolute tolerance of the tested unknowns; empty: all 1 */
   /* sees every output point: t, U, U', U'' */
   std::function<void(double, const double *, const double *, const double *)> look = nullptr;
 };
@@ -59,7 +63,7 @@ public:
     if (context_) SUNContext_Free(&context_);
   }
 
-  /* What a run has found at the output points */
+  /* Values recorded at the output points */
   const Recorder &recorded() const { return recorder_; }
 
   Run run(double eps, const Limits &limits)
@@ -87,7 +91,7 @@ private:
   IDASettings           settings_;
   std::vector<double>   y0_, yp0_;
   Entries               entries_;
-  std::vector<PetscInt> slot_; /* where an entry goes in the matrix's array of values */
+  std::vector<PetscInt> slot_; /* position of an entry in the matrix's array of values */
   SUNContext            context_ = nullptr;
   N_Vector              y_ = nullptr, yp_ = nullptr, tolerance_ = nullptr, id_ = nullptr;
   SUNMatrix             matrix_ = nullptr;
@@ -161,7 +165,7 @@ private:
     columns_.assign(SUNSparseMatrix_IndexPointers(matrix_), SUNSparseMatrix_IndexPointers(matrix_) + n + 1);
     solver_ = SUNLinSol_KLU(y_, matrix_, context_);
   }
-  std::vector<sunindextype> pattern_, columns_; /* IDA clears the matrix, pattern included, before every Jacobian */
+  std::vector<sunindextype> pattern_, columns_; /* kept, because IDA clears the matrix including its pattern before every Jacobian */
 
   void solve(const Limits &limits, Run &run)
   {
@@ -202,7 +206,7 @@ private:
     static_cast<IDASolver *>(self)->system_.residual(t, N_VGetArrayPointer(y), N_VGetArrayPointer(yp),
                                                      N_VGetArrayPointer(f));
     for (sunindextype i = 0; i < NV_LENGTH_S(f); i++)
-      if (!std::isfinite(N_VGetArrayPointer(f)[i])) return 1; /* recoverable: IDA tries a smaller step */
+      if (!std::isfinite(N_VGetArrayPointer(f)[i])) return 1; /* a recoverable error: IDA tries a smaller step */
     return 0;
   }
 

@@ -1,4 +1,4 @@
-/* The page of the comparison: what was run, pictures, tables, and what hhtdae's own settings cost. */
+/* The page of the comparison: runs, pictures, tables, and the costs of variations of hhtdae's settings */
 #ifndef WORKPRECISION_PAGE_H
 #define WORKPRECISION_PAGE_H
 
@@ -95,7 +95,7 @@ inline PetscErrorCode addGroup(hhtbench::Page &page, const Results &r, bool scen
   PetscFunctionReturn(0);
 }
 
-/* Variations of the defaults, one at a time; rows that repeat a default show how far repetitions differ */
+/* Variations of the defaults, one at a time; rows that repeat the default show the variation between repetitions */
 inline void addSweep(hhtbench::Page &page, const Results &sweep)
 {
   page.section("hhtdae's own settings");

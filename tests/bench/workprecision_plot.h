@@ -9,7 +9,7 @@
 namespace wp
 {
 
-/* Range of the errors and times of what is drawn in a panel; false if there is nothing to draw */
+/* Ranges of errors and times in a panel; false if there is nothing to draw */
 struct Range {
   double x0 = 1e300, x1 = 0., y0 = 1e300, y1 = 0.;
 };
@@ -30,13 +30,13 @@ inline bool findRange(const Results &r, size_t i, int kind, bool overview, Range
 
 inline void plotData(FILE *g, const Curve &c, int kind)
 {
-  fprintf(g, "NaN NaN\n"); /* keeps a solver that failed everywhere in the key */
+  fprintf(g, "NaN NaN\n"); /* keeps a solver that failed everywhere in the legend */
   for (const Run &r : c.runs)
     if (r.failure.empty() && r.error[kind] > 0.) fprintf(g, "%.6e %.6e\n", r.error[kind], r.time);
   fprintf(g, "e\n");
 }
 
-/* Line style of the k-th solver that is drawn */
+/* Line style of the k-th solver in the picture */
 inline std::string style(int k)
 {
   static const char *const colour[] = {"#d00000", "#ff8c00", "#0060c0", "#909090", "#000000",
@@ -45,7 +45,7 @@ inline std::string style(int k)
   return std::string("with linespoints dt 1 lc rgb '") + colour[k % 10] + "' pt " + std::to_string(point[k % 12]);
 }
 
-/* Errors above 10 are no solution: the picture ends there */
+/* Errors above 10 mean that there is no solution: the picture ends there */
 inline void plotCurves(FILE *g, const Results &r, size_t i, int kind, bool overview, bool key)
 {
   const char *separator = "plot ";
@@ -70,7 +70,7 @@ inline void plotCurves(FILE *g, const Results &r, size_t i, int kind, bool overv
 
 inline std::string overviewName(bool scene) { return scene ? "workprecision_scenes.png" : "workprecision.png"; }
 
-/* Without what tells a scene from the hand-written problem of the same name */
+/* The name without the prefix that distinguishes a scene from the hand-written problem of the same name */
 inline std::string plainName(const Case &c)
 {
   const size_t colon = c.name.find(':');
@@ -92,7 +92,7 @@ inline void plotProblem(FILE *g, const Results &r, size_t i, const std::string &
   fprintf(g, "unset multiplot\nunset output\n");
 }
 
-/* Small multiples: a panel per problem, and the key in a strip below */
+/* A panel for each problem, and the legend in a strip below */
 inline void plotOverview(FILE *g, const Results &r, const Group &group, const std::string &file)
 {
   const int    panels = (int)group.size(), columns = panels <= 4 ? 2 : panels <= 9 ? 3 : 4;
@@ -125,8 +125,8 @@ inline void plotOverview(FILE *g, const Results &r, const Group &group, const st
   fprintf(g, "\nunset multiplot\nunset output\n");
 }
 
-/* Of every problem, and an overview of the hand-written ones and one of the scenes, where there are any; drawn: false
-   if there is no gnuplot */
+/* Pictures of every problem, and overviews of the hand-written problems and of the scenes, if there are any; drawn:
+   false if gnuplot is not available */
 inline PetscErrorCode Plot(const Results &r, const std::string &out, bool *drawn)
 {
   PetscFunctionBegin;

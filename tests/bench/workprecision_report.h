@@ -22,7 +22,7 @@ struct Results {
   std::vector<std::vector<Curve>> curve; /* [case][solver]; empty: not run */
 };
 
-/* Which cases a table or a picture is about */
+/* Indices of the cases in a table or a picture */
 using Group = std::vector<size_t>;
 
 inline Group Scenes(const Results &r, bool scene)
@@ -33,10 +33,10 @@ inline Group Scenes(const Results &r, bool scene)
   return g;
 }
 
-/* What of a run's time counts: all of it, or less what the adapter alone makes */
+/* The time that counts: all of it, or all except the evaluations that only the adapter needs */
 enum class Time { All, WithoutAdapter };
 
-/* CPU time at which a curve reaches an error, log-log between the first two points that bracket it; NaN outside */
+/* CPU time at which a curve reaches an error, interpolated log-log between the first two points that bracket it; NaN outside */
 inline double timeAtError(const Curve &c, int kind, double target, Time what = Time::All)
 {
   const Run *before = nullptr;
@@ -52,7 +52,7 @@ inline double timeAtError(const Curve &c, int kind, double target, Time what = T
   return std::nan("");
 }
 
-/* Of a solver to the first one's, where the reference is good enough to tell */
+/* Ratio of a solver's time to that of the first solver; NaN where the reference is not accurate enough */
 inline double ratioAt(const Results &r, size_t i, size_t s, int kind, double level, Time what = Time::All)
 {
   if (level < r.origin[i].trusted[kind]) return std::nan("");
@@ -65,7 +65,7 @@ inline std::vector<double> levels(int kind)
   return {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6};
 }
 
-/* Ratios of a solver's time to the first one's over error levels */
+/* Ratios of a solver's time to that of the first solver, over error levels */
 struct Ratios {
   double logSum = 0., worst = 0., best = 0.;
   int    count = 0;
@@ -97,7 +97,7 @@ inline PetscErrorCode WriteCSV(const Results &r, const std::string &file)
   fprintf(f, "problem,solver,eps,error_q,error_v,error_lambda,time,adapter,steps,rejected,newton,residuals,jacobians,"
              "factorizations,failure\n");
   for (size_t i = 0; i < r.cases.size(); i++)
-    for (size_t s = 0; s < r.curve[i].size(); s++) /* none where there is no reference */
+    for (size_t s = 0; s < r.curve[i].size(); s++) /* no errors where there is no reference */
       for (size_t k = 0; k < r.curve[i][s].runs.size(); k++) {
         const Run &run = r.curve[i][s].runs[k];
         fprintf(f, "%s,\"%s\",%.3e", r.cases[i].name.c_str(), r.solvers[s].name.c_str(), r.curve[i][s].eps[k]);

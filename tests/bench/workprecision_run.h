@@ -24,28 +24,28 @@ using hhtex::Problem;
 
 inline bool isMultiplier(TSHHT3Role r) { return r == TSHHT3_HOLONOMIC || r == TSHHT3_NONHOLONOMIC; }
 
-/* What a run cost; counted the same way for every solver, at the problem's own functions, as far as possible */
+/* Costs of a run, counted for all solvers in the same way, as far as possible in the problem's own functions */
 struct Counters {
   long steps = 0, rejected = 0, newton = 0, residuals = 0, jacobians = 0, factorizations = 0;
 };
 
 constexpr const char *tooLong = "took longer than the limit";
 
-/* One run, or the median of several: failure is empty if the solver reached the end */
+/* One run, or the median of several; failure is empty if the solver reached the end */
 struct Run {
-  double   time = 0., error[3] = {-1., -1., -1.}; /* q and states, q', lambda; negative where there is no reference */
-  double   extra = 0.; /* of the time, what first-order forms spend in evaluations that only the adapter makes */
+  double   time = 0., error[3] = {-1., -1., -1.}; /* errors of q and states, of q', of lambda; negative where there is no reference */
+  double   extra = 0.; /* part of the time that first-order forms spend in evaluations needed only by the adapter */
   Counters count;
   std::string failure;
 };
 
-/* Passes everything on, and counts. After the deadline, and after as many residuals as there may be, they are not a number, which ends solvers
-   that never accept a step and so never come by a monitor. */
+/* Forwards and counts all calls. After the deadline, or after the largest number of residuals, residuals are NaN; this
+   ends solvers that accept no step and therefore never call a monitor */
 struct CountedProblem : Problem {
   const Problem &p;
   mutable long   residuals = 0, jacobians = 0;
-  double         deadline = 1e300; /* CPU time of the process */
-  double         most     = 1e300; /* residuals */
+  double         deadline = 1e300; /* CPU time of the process at which the run must end */
+  double         most     = 1e300; /* largest number of residuals */
   mutable bool   late     = false;
 
   explicit CountedProblem(const Problem &problem) : p(problem)
@@ -73,14 +73,14 @@ struct CountedProblem : Problem {
   }
 };
 
-/* The reference at the output points, with the weights 1/max(1, running maximum) of section 11 of the method */
+/* The reference at the output points, with the weights 1/max(1, largest value so far), those of the integrator's error test */
 struct Reference {
   PetscInt                         n;
   std::vector<TSHHT3Role>          role;
-  std::vector<double>              times; /* of the output points, without t0 */
+  std::vector<double>              times; /* output points without t0 */
   std::vector<std::vector<double>> u, v, weightU, weightV;
 
-  /* Output points alone: nothing is compared, errors are negative */
+  /* Output points only: nothing is compared, and errors are negative */
   Reference(const Problem &p, const std::vector<double> &at)
       : n(p.n), role(p.role), times(at), u(at.size(), std::vector<double>(n, std::nan(""))), v(u),
         weightU(at.size(), std::vector<double>(n, 1.)), weightV(weightU)
@@ -92,7 +92,7 @@ struct Reference {
     std::vector<double> ur(n), vr(n), ar(n), maxU(n, 1.), maxV(n, 1.);
     for (double t : p.referenceTimes()) {
       if (!p.reference(t, ur.data(), vr.data(), ar.data())) continue;
-      for (PetscInt i = 0; i < n; i++) { /* fmax() passes over what is not known */
+      for (PetscInt i = 0; i < n; i++) { /* fmax() ignores NaN, that is, values that are not known */
         maxU[i] = std::fmax(maxU[i], std::abs(ur[i]));
         maxV[i] = std::fmax(maxV[i], std::abs(vr[i]));
       }
@@ -124,11 +124,11 @@ private:
   {
     if (std::isnan(ref) || std::isnan(error)) return;
     const double e = std::abs(x - ref) / weight;
-    if (!(e <= error)) error = e; /* a NaN that was computed must show */
+    if (!(e <= error)) error = e; /* a computed NaN must not be lost */
   }
 };
 
-/* Takes a solver's values at the output points, in their order */
+/* Stores a solver's values at the output points, which must come in order */
 struct Recorder {
   const Reference                 &ref;
   std::vector<std::vector<double>> u, v;
@@ -142,7 +142,7 @@ struct Recorder {
     u.emplace_back(us, us + ref.n);
     v.emplace_back(vs, vs + ref.n);
   }
-  /* Errors of a run that claims to have arrived */
+  /* Errors of a run that reached the end */
   void finish(Run &run) const
   {
     if (!run.failure.empty()) return;
@@ -157,15 +157,16 @@ struct Recorder {
   }
 };
 
-/* Where a problem's reference comes from */
+/* Origin of a problem's reference */
 struct Origin {
-  std::string reference;                 /* empty: the problem's own, exact or tabulated */
-  std::string failure;                   /* why there is none to rely on */
-  double      trusted[3] = {0., 0., 0.}; /* errors below are not told from the reference's own: q, q', multipliers */
-  double      ida[3] = {}, hht[3] = {};  /* differences that say so */
+  std::string reference;                 /* empty: the problem's own reference, exact or tabulated */
+  std::string failure;                   /* reason why there is no reliable reference */
+  double      trusted[3] = {0., 0., 0.}; /* errors below these cannot be distinguished from those of the reference: q, q', multipliers */
+  double      ida[3] = {}, hht[3] = {};  /* differences on which this is based */
 };
 
-/* Rotations of a scene: local vectors, Euler angles about axes that it chooses, or those of the problem, which others integrate */
+/* Rotations of a scene: local vectors, Euler angles about axes chosen by the scene, or Euler angles of the problem,
+   which the other solvers integrate */
 enum class SceneAngles { None, Own, Problems };
 
 /* A problem of the comparison. d Phi/dt of problems whose constraints move (first-order forms need it): adds to f, one
@@ -181,7 +182,7 @@ struct Case {
   bool                                                                           scene    = false;
 };
 
-/* The limits for one run, in CPU seconds and residuals; beyond them a solver counts as failed */
+/* Limits for one run, in CPU seconds and residuals, beyond which a solver counts as failed */
 struct Limits {
   double seconds = 10., residuals = 1e300;
 };

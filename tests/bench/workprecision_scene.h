@@ -1,8 +1,7 @@
-/*
-  Scenes in the comparison: their case, and a reference where no formula gives one. The reference is IDA's at a tight
-  tolerance. Two differences say what it is worth: to IDA at a tolerance ten times looser, which estimates its error,
-  and to hhtdae, another method on another formulation, at two tolerances, whose difference has to fall.
-*/
+/* Scenes in the comparison: their case, and a reference where no formula gives one. The reference is IDA's at a tight
+   tolerance. Two differences measure its quality: the difference to IDA at a tolerance ten times as large, which
+   estimates its error, and the differences to hhtdae, another method on another formulation, at two tolerances, of
+   which the second must be smaller */
 #ifndef WORKPRECISION_SCENE_H
 #define WORKPRECISION_SCENE_H
 
@@ -19,7 +18,7 @@ using hhtbench::SceneProblem;
 
 inline const SceneProblem &AsScene(const Problem &p) { return static_cast<const SceneProblem &>(p); }
 
-/* What the solvers need to know of any scene */
+/* The functions of any scene that solvers need */
 inline Case SceneCallbacks()
 {
   Case c;
@@ -33,7 +32,7 @@ inline Case SceneCallbacks()
   return c;
 }
 
-/* The case of one that is there already */
+/* The case of an existing scene problem */
 inline Case SceneCase(const SceneProblem &p)
 {
   Case c = SceneCallbacks();
@@ -45,17 +44,17 @@ inline Case SceneCase(const SceneProblem &p)
 
 struct SceneReferenceSettings {
   int         intervals = 20;    /* output points, equally spaced */
-  double      eps       = 1e-11; /* of IDA */
+  double      eps       = 1e-11; /* tolerance of IDA */
   double      hht[2]    = {1e-6, 1e-8};
   Limits      limits    = {60.}; /* of each run */
-  IDASettings ida;               /* largest step, order and so on; the form is tried in turn */
+  IDASettings ida;               /* largest step, order and other settings; both forms are tried one after the other */
 };
 
 struct SceneReferenceReport {
-  std::string form;                        /* of IDA, empty: there is no reference */
-  std::string failure;                     /* what went wrong, empty: nothing */
+  std::string form;                        /* form of IDA; empty: there is no reference */
+  std::string failure;                     /* reason of a failure; empty: none */
   double      ida[3]    = {-1., -1., -1.}; /* largest weighted difference to IDA at 10 eps: q, q', multipliers */
-  double      hht[2][3] = {{-1., -1., -1.}, {-1., -1., -1.}}; /* to hhtdae at its two tolerances */
+  double      hht[2][3] = {{-1., -1., -1.}, {-1., -1., -1.}}; /* differences to hhtdae at its two tolerances */
   double      idaTime = 0., hhtTime[2] = {0., 0.};
   Counters    idaCount;
   /* An error below this cannot be told from the reference's */
@@ -72,7 +71,7 @@ inline std::vector<double> OutputTimes(const Problem &p, int intervals)
   return times;
 }
 
-/* One run of IDA that gives the states at the output points */
+/* One run of IDA that records the states at the output points */
 inline Run RunForStates(const SceneProblem &p, const Reference &ref, IDASettings ida, double eps, const Limits &limits,
                         std::vector<std::vector<double>> (&states)[3])
 {
@@ -88,7 +87,7 @@ inline Run RunForStates(const SceneProblem &p, const Reference &ref, IDASettings
   return solver.run(eps, limits);
 }
 
-/* The form of IDA that reaches the end: stabilized, else index 3 */
+/* Finds the form of IDA that reaches the end: stabilized, otherwise index 3 */
 inline PetscErrorCode FindStates(SceneProblem &p, const SceneReferenceSettings &s, IDASettings &ida,
                                  SceneReferenceReport &r)
 {
@@ -120,8 +119,8 @@ inline PetscErrorCode FindStates(SceneProblem &p, const SceneReferenceSettings &
 
 } // namespace detail
 
-/* Gives p its reference, and says what it is worth; the report's failure is empty if IDA and hhtdae agree the better
-   the tighter hhtdae's tolerance is. A failure of a solver is no error. */
+/* Computes the reference of p and measures its quality; the report's failure is empty if IDA and hhtdae agree better
+   at hhtdae's tighter tolerance. A failure of a solver is not an error */
 inline PetscErrorCode ComputeSceneReference(SceneProblem &p, const SceneReferenceSettings &s, SceneReferenceReport *r)
 {
   IDASettings ida;

@@ -1,4 +1,4 @@
-/* The scenes of the comparison: models of the example programs, over times that every integrator can manage. */
+/* The scenes of the comparison: models of the example programs, over times that every integrator can complete */
 #ifndef WORKPRECISION_SCENES_H
 #define WORKPRECISION_SCENES_H
 
@@ -20,7 +20,7 @@ namespace wp
 
 using hhtdae::Scene;
 
-/* A model that has its scene as a member */
+/* A model that contains its scene as a member */
 template <class Model, class... Args> SceneProblem::Build Modelled(Args... args)
 {
   return [=](MPI_Comm comm) {
@@ -49,7 +49,7 @@ inline SceneProblem::Build QuarterCarOver(double rise)
   };
 }
 
-/* The plate with a hole, meshed and reduced once */
+/* The plate with a hole, meshed and reduced only once */
 inline const hhtdae::ModalBody &ReducedArm()
 {
   static hhtdae::ReducedBody body;
@@ -80,7 +80,7 @@ inline SceneProblem::Build FlexPendulum()
   };
 }
 
-/* As modal bodies one after the other, or as two-node beams */
+/* As a chain of modal bodies, or as two-node beams */
 inline SceneProblem::Build SpinBeam(int parts, int beams)
 {
   return [=](MPI_Comm comm) {
@@ -101,7 +101,7 @@ inline SceneProblem::Build SpinBeam(int parts, int beams)
 
 #if defined(HHTDAE_HAVE_IDA)
 
-/* The problem with its reference, and what that is worth */
+/* Makes the problem with its reference, and reports the quality of the reference */
 inline PetscErrorCode MakeScene(const std::string &name, const SceneProblem::Build &build, double end,
                                 std::unique_ptr<Problem> *problem, Origin *origin)
 {

@@ -62,7 +62,7 @@ inline Table::Row levelHead(const char *first, int kind)
   return row;
 }
 
-/* One problem: one row per solver, one column per error level */
+/* One problem: a row for each solver, a column for each error level */
 inline Table problemTable(const Results &r, size_t i, int kind)
 {
   Table t;
@@ -89,7 +89,7 @@ inline Table problemTable(const Results &r, size_t i, int kind)
   return t;
 }
 
-/* Geometric means over the problems of a group, per error level and over everything */
+/* Geometric means over the problems of a group, for each error level and over all of them */
 inline Table summaryTable(const Results &r, const Group &group, int kind, const std::string &what,
                           Time time = Time::All)
 {
@@ -122,7 +122,7 @@ inline Table summaryTable(const Results &r, const Group &group, int kind, const 
   return t;
 }
 
-/* Geometric mean per problem: where a solver is good and where not */
+/* Geometric mean for each problem, which shows where a solver is good */
 inline Table byProblemTable(const Results &r, const Group &group, int kind, const std::string &what)
 {
   Table t;
@@ -142,7 +142,7 @@ inline Table byProblemTable(const Results &r, const Group &group, int kind, cons
   return t;
 }
 
-/* What failed, with its reason and the tolerances */
+/* Failures with their reasons and tolerances */
 inline Table failureTable(const Results &r)
 {
   Table t;
@@ -161,7 +161,7 @@ inline Table failureTable(const Results &r)
   return t;
 }
 
-/* What the references of the scenes are worth */
+/* Quality of the references of the scenes */
 inline Table originTable(const Results &r)
 {
   Table t;

@@ -1,8 +1,6 @@
-/*
-  PETSc's time steppers: hhtdae, ALPHA2 and BDF, the last one on the first-order form. Output between steps is by
-  hhtdae's and BDF's own interpolation; ALPHA2 has none and gets cubic Hermite polynomials, so that nobody has to hit a
-  point.
-*/
+/* PETSc's time steppers: hhtdae, ALPHA2, and BDF on the first-order form. Output between steps is by the interpolation
+   of hhtdae and BDF; ALPHA2 has none and gets cubic Hermite polynomials, so that no solver has to end steps at output
+   points */
 #ifndef WORKPRECISION_TS_H
 #define WORKPRECISION_TS_H
 
@@ -17,13 +15,14 @@ enum class Stepper { HHT, Alpha2, BDF };
 
 struct TSSettings {
   Stepper                           stepper = Stepper::HHT;
-  std::function<PetscErrorCode(TS)> configure;                            /* after TSSetType() */
+  std::function<PetscErrorCode(TS)> configure;                            /* called after TSSetType() */
   FirstOrder::Form                  form  = FirstOrder::Form::Stabilized; /* BDF */
-  bool                              euler = false; /* hhtdae on scenes: Euler angles, about the axes that the scene chooses, in place of local rotation vectors */
-  bool                              fixed = false; /* ALPHA2: constant steps, about 0.1 eps^0.4 of the run */
+  /* hhtdae on scenes: Euler angles about axes chosen by the scene, instead of local rotation vectors */
+  bool                              euler = false;
+  bool                              fixed = false; /* ALPHA2: constant steps of about 0.1 eps^0.4 of the run */
 };
 
-/* What the callbacks of one run need */
+/* Data of the callbacks of one run */
 struct TSRun {
   const Case                 &which;
   const Problem              &problem;
@@ -33,9 +32,9 @@ struct TSRun {
   Recorder                    recorder;
   std::unique_ptr<FirstOrder> system; /* BDF */
   Entries                     entries;
-  std::vector<double>         u, v, u0, v0; /* output; last step of ALPHA2 */
+  std::vector<double>         u, v, u0, v0; /* output; values at the beginning of the last step of ALPHA2 */
   double                      t0              = 0.;
-  TSI2Function                function        = nullptr; /* of a scene's own TS */
+  TSI2Function                function        = nullptr; /* of the scene's own TS */
   TSI2Jacobian                jacobian        = nullptr;
   void                       *functionContext = nullptr, *jacobianContext = nullptr;
   TS                          ts = nullptr;
@@ -169,8 +168,8 @@ inline PetscErrorCode FirstOrderJacobian(TS, PetscReal t, Vec Y, Vec Yp, PetscRe
   PetscFunctionReturn(0);
 }
 
-/* Tolerances that leave multipliers and other algebraic unknowns, and in the first-order form velocities, out of the
-   error test: PETSc has no other way to say so */
+/* Vectors of tolerances that exclude multipliers and other algebraic unknowns, and velocities in the first-order form,
+   from the error test; PETSc has no other way */
 inline PetscErrorCode SelectiveTolerances(TSRun &r, double eps)
 {
   Vec      tolerance;
@@ -225,8 +224,8 @@ inline PetscErrorCode CreateFirstOrderTS(TSRun &r)
   PetscFunctionReturn(0);
 }
 
-/* ALPHA2 and BDF have no choice of the first step and no matrix of their own choosing: a step small enough for the
-   tolerance, a direct solver, error control */
+/* ALPHA2 and BDF neither choose their first step nor their linear solver: they get a step small enough for the
+   tolerance, a direct solver, and error control */
 inline PetscErrorCode ConfigureOther(TSRun &r, double eps)
 {
   TSAdapt adapt;
@@ -235,7 +234,7 @@ inline PetscErrorCode ConfigureOther(TSRun &r, double eps)
   PC      pc;
 
   PetscFunctionBegin;
-  /* a last constant step of odd length would leave its transient in the multipliers */
+  /* a last step of another length would leave a transient in the multipliers */
   PetscCall(
       TSSetTimeStep(r.ts, (r.problem.t1 - r.problem.t0) *
                               (r.settings.fixed ? 1. / std::round(10. * std::pow(eps, -.4)) : 1e-3 * std::cbrt(eps))));
@@ -253,7 +252,7 @@ inline PetscErrorCode ConfigureOther(TSRun &r, double eps)
   PetscFunctionReturn(0);
 }
 
-/* A scene's own callbacks, counted and with the deadline */
+/* The scene's own callbacks with counters and the deadline */
 inline PetscErrorCode NativeFunction(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
 {
   TSRun                &r = *static_cast<TSRun *>(ctx);
@@ -307,7 +306,7 @@ inline PetscErrorCode CreateTS(TSRun &r, double eps)
     PetscCall(CreateNativeTS(r));
   else
     PetscCall(hhtex::ProblemCreateTS(PETSC_COMM_SELF, r.counted, &r.ts, &r.U, &r.V));
-  /* before the type 0.1, PETSc's default, counts as set by nobody: TSHHT3 chooses the first step */
+  /* set before TSSetType(), PETSc's default of 0.1 does not count as set by the user: TSHHT3 chooses the first step */
   if (r.settings.stepper == Stepper::HHT && !r.which.createTS) PetscCall(TSSetTimeStep(r.ts, 0.1));
   PetscCall(TSSetType(r.ts, type[(int)r.settings.stepper]));
   PetscCall(TSSetMaxSteps(r.ts, 100000000));
@@ -352,7 +351,7 @@ inline PetscErrorCode ReadTSCounters(TSRun &r, Run &run)
   PetscCall(TSGetStepNumber(r.ts, &steps));
   PetscCall(TSGetStepRejections(r.ts, &rejected));
   PetscCall(TSGetSNESIterations(r.ts, &newton));
-  run.count = {steps, rejected, newton, r.counted.residuals, r.counted.jacobians, newton}; /* full Newton */
+  run.count = {steps, rejected, newton, r.counted.residuals, r.counted.jacobians, newton}; /* full Newton: a factorization in each iteration */
   PetscFunctionReturn(0);
 }
 
