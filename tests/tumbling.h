@@ -1,12 +1,13 @@
 /*
-  A rigid body in 3-1-3 Euler angles that tumbles through sin(theta) = 0, and takes a new body-fixed reference frame
-  before it gets there: A = A313(eps) C, with another C and other angles for the same A.
+  A rigid body in 3-1-3 Euler angles that tumbles through sin(theta) = 0. Before it gets there it changes to a new body-fixed
+  reference frame: A = A313(eps) C, with another C and other angles for the same A.
 
-  Free, the angles are all there is. On a pivot the body is given by absolute coordinates, its centre r and the angles:
+  A free body has the angles as its only unknowns. A body on a pivot has absolute coordinates, its centre of mass r and the
+  angles:
 
-    m r'' + m g e_z + lambda                             = 0
-    G^T (J^ w' + w x J^ w - X^ x A313^T lambda)          = 0      w = G eps', w' = G eps'' + G' eps', J^ = C J C^T, X^ =
-  C X r - A313 X^                                          = 0
+    m r'' + m g e_z + lambda                    = 0
+    G^T (J^ w' + w x J^ w - X^ x A313^T lambda) = 0    w = G eps', w' = G eps'' + G' eps', J^ = C J C^T, X^ = C X
+    r - A313 X^                                 = 0
 
   in the reference frame. Reference: Euler's equations about the fixed point, extrapolation of order 20 in long double.
 */

@@ -1,7 +1,7 @@
 /*
-  The all-terrain vehicle under several integrators: hhtdae, and SUNDIALS IDA on the index-3 first-order form in the
-  manner of Adams' GSTIFF (BDF of variable order, velocities and multipliers kept out of the error test) and on the
-  stabilized index-2 form. Every run gives the channels of the scene every 4 ms, and what it cost.
+  The all-terrain vehicle with several integrators: hhtdae, and SUNDIALS IDA on the index-3 first-order form in the
+  manner of Adams' GSTIFF (BDF of variable order, velocities and multipliers excluded from the error test) and on the
+  stabilized index-2 form. Every run returns the channels of the scene every 4 ms, and its costs.
 */
 #ifndef HHTDAE_BENCH_ATV_RUNS_H
 #define HHTDAE_BENCH_ATV_RUNS_H

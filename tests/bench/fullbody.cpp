@@ -1,15 +1,16 @@
 /*
-  A step of a whole finite-element model in a scene: seconds, factorizations, memory.
+  Cost of a step of a whole finite-element model in a scene: seconds, factorizations, memory.
 
     mpiexec -n 2 fullbody -size 60,12,12 -law large -steps 20
 
-  -size: bricks along x, y, z; -brick8: of 8 nodes in place of 20; -held clamp,hinge,free,rod: at its root, or it spins
-  freely, which needs no multipliers, or it is the connecting rod of a slider-crank, tied to pins at both ends, whose
-  crank turns once in -turn <4> bending periods; -steps after the first, which the table leaves out with the choice of
-  the solver, and which are a stage of their own in -log_view;
-  -part <0.01>: of the first bending period, the step's length (-ts_adapt_type basic for steps by error);
-  -blocks: tells the solver of the three unknowns of a node and of rigid motions (free alone). Any -ksp_, -pc_, -mat_
-  and -ts_hhtdae_ option holds.
+  -size: bricks along x, y, z; -brick8: bricks of 8 nodes instead of 20;
+  -held clamp,hinge,free,rod: the body is clamped or hinged at its root; or it spins freely, without multipliers; or it is
+  the connecting rod of a slider-crank, tied to pins at both ends, whose crank turns once in -turn <4> bending periods;
+  -steps: measured steps; they follow the first one, which includes the choice of the solver and is not in the table, and
+  are a separate stage in -log_view;
+  -part <0.01>: length of a step, as a part of the first bending period (-ts_adapt_type basic for error control);
+  -blocks: gives the solver the block size of 3 and the rigid-body modes (with `free` only). All -ksp_, -pc_, -mat_ and
+  -ts_hhtdae_ options can be used.
 */
 #include "beam_bodies.h"
 #include "process_use.h"

@@ -1,25 +1,25 @@
 /*
-  Time per step of a scene with a flexible body of many modes, beside what dense algebra alone would take.
+  Time per step of a scene with a flexible body of many modes, compared with a bound: the time of its dense algebra alone.
 
     modalstep -modes 20,60,134 -attachments 2,20
 
-  The body is a bar of bricks, reduced here; rigid bodies hang on half of its attachments by revolute joints, springs to
-  the ground hold the other half; it falls into the springs. The bound does, with as many calls as the run counted, by
-  LAPACK and BLAS:
+  The body is a bar of bricks, which the program reduces; rigid bodies are connected to half of its attachments by revolute
+  joints, the other half is held by springs to the ground, into which the bar falls. The bound is the time of these calls of
+  LAPACK and BLAS, as many as the run counted:
 
     factorization  dgetrf of a dense matrix of 6 + modes
     solve          dgetrs with it
     residual       18 dgemv of modes x modes: the invariants quadratic in the modes with coordinates and rates
     Jacobian       27 dgemv (accelerations, too) and 9 sums of matrices of modes x modes
 
-  The attachments' joints and bodies are not in it. The second ratio is to a bound that adds what it takes to eliminate
-  them: a product of rank 6 per attachment for each factorization, and 12 columns more per attachment for each solve.
-  The line below says the same of the steps after the first, without what is done once: analysis, the search for pivots,
-  consistent accelerations.
-  Then the same number of modes from a finer mesh; its motion and its counts differ a little, so that times are compared
-  as ratios to the bound.
+  The bound does not contain the joints and bodies at attachments. The second ratio is to a bound that includes their
+  elimination: a product of rank 6 per attachment for each factorization, and 12 more columns per attachment for each solve.
+  The following line has the same ratios for the steps after the first, that is, without symbolic analysis, pivoting and
+  consistent accelerations, which are computed once.
+  The same number of modes is then taken from a finer mesh, whose motion and counts differ slightly, so that times are
+  compared as ratios to the bound.
 
-    -end <2>  -tolerance <1e-5>  -mesh <24>,<40>: bricks along the bar  -repeat <3>: the least time of so many counts
+    -end <2>  -tolerance <1e-5>  -mesh <24>,<40>: bricks along the bar  -repeat <3>: repetitions, of which the shortest time counts
 */
 #include "box_model.h"
 #include "hhtdae/flexible.h"

@@ -3,9 +3,10 @@
 
     mpiexec -n 2 reduction -size 80,60,40 -bar 6 -attachments 20 -modes 134
 
-  -size: bricks along x, y, z; -bar: bricks across a bar of the frame; -average: attachments as averages instead of
-  rigid ones; -modes: modes that are kept in the end, as many as there are normal modes in all: constraint modes come on
-  top and the highest are cut off. One line per phase: seconds, memory of all ranks after it and at most.
+  -size: bricks along x, y, z; -bar: bricks across a bar of the frame; -average: averaging instead of rigid attachments;
+  -modes: number of modes of the reduced body, and of fixed-interface modes computed: with the constraint modes there are
+  more, of which the highest are left out. The program prints a line per phase: seconds, memory of all ranks after the phase
+  and its maximum.
 */
 #include "box_model.h"
 #include "hhtdae/flexible.h"

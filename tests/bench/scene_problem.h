@@ -5,14 +5,16 @@
     PetscCall(SceneProblem::make("pendulum", [](MPI_Comm comm) { ... return scene; }, 2., &p));
     IDASolver ida(SceneCase(*p), *p, reference, settings);
 
-  It is serial. Residual and Jacobian are those of the scene's TS, on the arrays of whoever calls. The consistent start,
-  which reference(t0) gives, is the one that hhtdae finds: read off the beginning of its first step.
+  The problem is serial. Residual and Jacobian are those of the scene's TS, evaluated on the caller's arrays. The
+  consistent start, which reference(t0) returns, is the one that hhtdae computes, read at the beginning of its first step.
 
-  A scene remembers angles over full turns, from accepted step to accepted step. Other integrators do not tell when they
-  accept one: here the last state before the time goes on counts as accepted. initial() puts the memory back to the
-  start. Local rotation vectors are another thing that they cannot follow, so the problem has Euler angles; and new axes that a body gets when
-  these come near their singularity. fitAxes() turns the axes of all bodies so that they stay away from it for the whole run, and checkAxes()
-  refuses scenes in which that cannot be; hhtdae runs with what coordinates it likes, and toStart() brings its results to these angles.
+  A scene counts full turns of angles from accepted step to accepted step. Other integrators do not report their accepted
+  steps: here the last state before the time advances counts as accepted. initial() restores the counts of the start.
+
+  Other integrators also support neither local rotation vectors nor the change of axes of a body whose Euler angles come
+  near their singularity. The problem therefore has Euler angles about fixed axes: fitAxes() chooses the axes of all bodies
+  so that they stay away from the singularity for the whole run, and checkAxes() refuses scenes for which there are no such
+  axes. hhtdae uses its own coordinates, and toStart() converts its results to these angles.
 */
 #ifndef HHTDAE_BENCH_SCENE_PROBLEM_H
 #define HHTDAE_BENCH_SCENE_PROBLEM_H

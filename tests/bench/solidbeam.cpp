@@ -1,19 +1,19 @@
 /*
   A solid cantilever under a load at its tip as a whole finite-element model: history of displacements, time of a step,
-  memory; by hhtdae, by backward Euler on the same equations, or at rest. The scripts t10_beam.py and calculix_beam.py
-  run it beside others' figures and programs.
+  memory; by hhtdae, by backward Euler for the same equations, or its static solution. The scripts t10_beam.py and
+  calculix_beam.py compare it with published figures and with CalculiX.
 
     solidbeam -size 9,6,3 -load 5000,0,0 -ts_dt 1e-3 -end 0.05 -motion u.txt
 
-  -by hhtdae, euler, static: euler solves each step by Newton's method with a new matrix in every iteration, prefix
-  euler_; static raises the load in -increments <1>, prefix static_;
+  -by hhtdae, euler, static: euler solves each step by Newton's method with a new matrix in every iteration (options with
+  the prefix euler_); static increases the load in -increments <1> (prefix static_);
   -size, -dimensions <3,2,1>: cells along x, y, z and lengths; -element tetrahedron10, brick20: a cell is six tetrahedra
-  or one brick; -write_mesh FILE keeps this mesh; -mesh FILE in their place: Gmsh's, with physical groups "root", which
-  is clamped, and "tip"; -young <7e8>, -poisson <0.33>, -density <2700>;
-  -load: the force on the tip, the same part of it on each of its nodes; -rise <0>: time in which it grows to that;
-  -end: time; -motion FILE: time and displacement of two nodes at the end of each step, those nearest to the corner of
-  the tip with the largest coordinates and to the middle of the edge with the largest y and z, and of the tip's mean; -every DT: at the multiples of DT in place of
-  the ends of steps, interpolated within hhtdae's steps.
+  or one brick; -write_mesh FILE: writes this mesh; -mesh FILE: reads a mesh of Gmsh instead, with the physical groups
+  "root", which is clamped, and "tip"; -young <7e8>, -poisson <0.33>, -density <2700>;
+  -load: the force on the tip, in equal parts on its nodes; -rise <0>: time in which the load increases to this value;
+  -end: final time; -motion FILE: writes time and displacements at the end of each step, of the nodes nearest to the corner
+  of the tip with the largest coordinates and to the middle of the edge with the largest y and z, and of the mean of the tip;
+  -every DT: at the multiples of DT instead of the ends of steps, interpolated within hhtdae's steps.
 */
 #include "beam_mesh.h"
 #include "process_use.h"

@@ -1,13 +1,12 @@
 /*
-  A case of the table of stability: a model, what it is judged by, and the figure that it must not exceed. A case that
-  cannot succeed names the words that its PETSc error must contain instead; what the last accepted state is worth is
-  then judged too, where known.
+  A case of the table of stability: a model, the quantity by which it is judged, and the figure that it must not exceed. A
+  case that cannot succeed states words that its PETSc error must contain instead; the last accepted state is then judged as
+  well, if its exact values are known.
 
     cases.push_back({"springs", "k=1e9", "position against the rigid rod", 2e-3, [](Run &run) -> PetscErrorCode { ...
   }});
 
-  The same cases are rows of the program `stability` and, where they are quick, tests in
-  tests/stability/test_extreme.cpp.
+  The program `stability` runs all cases; the fast ones are also tests in tests/stability/test_extreme.cpp.
 */
 #ifndef HHTDAE_BENCH_STABILITY_CASE_H
 #define HHTDAE_BENCH_STABILITY_CASE_H

@@ -1,19 +1,19 @@
 /*
-  Where the start of a small scene spends its time: one rod on a pin, a quarter of a swing. Milliseconds of processor time and by the
-  clock; the first line is what the dynamic linker takes before main() (processor time only). The second scene shows what of the first
-  one is the first use of PETSc's packages and of the libraries' pages.
+  Parts of the time that a program with a small scene takes: one rod on a pin, a quarter of a swing. Milliseconds of processor
+  time and of wall-clock time; the first line is the dynamic linker before main() (processor time only). The second scene shows
+  how much of the first one is due to the first use of PETSc's packages and of the pages of libraries.
 
     build/bin/startup
     OMPI_MCA_ess_singleton_isolated=1 build/bin/startup      a single process without Open MPI's daemon
 
-  Debian 12 with its own PETSc 3.18 and Open MPI 4.1, least of some runs on two cores that five other processes used, ms:
+  Debian 12 with its PETSc 3.18 and Open MPI 4.1, smallest of several times on two cores shared with five other processes, ms:
 
                                               cpu   by the clock
-      dynamic linking                          66                  109 libraries, 107 of them PETSc's; an eighth with a PETSc that needs 27
+      dynamic linking                          66                  109 libraries, 107 of them PETSc's; an eighth of this time with a PETSc that needs 27
       MPI_Init(), MPI_Finalize()               47   457, 57        isolated: 45, 280, 8
       PetscInitialize(), PetscFinalize()        1     1
-      first scene                             5.2   5.2            2 of it first use of TS, SNES, KSP and Mat
-      second scene                            1.4   1.4            0.8 to solve, 43 steps
+      first scene                             5.2   5.2            2 of them first use of TS, SNES, KSP and Mat
+      second scene                            1.4   1.4            0.8 of them the solve, 43 steps
 */
 #include <cmath>
 #include <cstdio>

@@ -8,8 +8,9 @@
     q' - v = 0                                   q' - v + Phi_q^T mu = 0
                                                  Phi_q v + Phi_t = 0
 
-  Phi_q comes from the problem's Jacobian with both shifts zero, (Phi_q v)_q + Phi_qt from a central difference of it
-  along (1, v) - in the iteration matrix only. (Phi_q^T mu)_q is left out of the matrix: mu vanishes with the step size.
+  Phi_q is taken from the problem's Jacobian with both shifts zero. (Phi_q v)_q + Phi_qt, which only the iteration matrix
+  needs, is a central difference of Phi_q along (1, v). (Phi_q^T mu)_q is left out of the matrix, because mu tends to zero
+  with the step size.
 */
 #ifndef WORKPRECISION_FIRSTORDER_H
 #define WORKPRECISION_FIRSTORDER_H

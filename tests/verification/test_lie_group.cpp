@@ -1,7 +1,7 @@
 /*
-  Bodies on a ball joint beside a generalized-alpha method on the rotation group that shares nothing with the library: attitude and angular
-  velocity about the joint, without constraints (Bruels, Cardona, Arnold, Mech. Mach. Theory 48, 2012), in axes of space or of the body. It is
-  checked with closed forms first; references are extrapolated in long double.
+  Bodies on a ball joint, compared with an implementation of the generalized-alpha method on the rotation group that shares no code with the
+  library: unknowns are the attitude and the angular velocity about the joint, without constraints (Bruels, Cardona, Arnold, Mech. Mach. Theory
+  48, 2012), in space axes or body axes. The implementation is first checked with closed forms; references are extrapolated in long double.
 */
 #include "../../examples/problems/extrapolation.h"
 #include "../../examples/scene_watch.h"

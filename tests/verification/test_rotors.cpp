@@ -1,6 +1,6 @@
 /*
-  Rotors in moving frames beside their equations in as many coordinates as they have freedoms, extrapolated in long double: a gyroscope in
-  massive rings (Cardan's suspension), which is a system of bodies and hinges here, and a disc with an unbalance on a flexible shaft.
+  Rotors in moving frames, compared with their equations in minimal coordinates, which are extrapolated in long double: a gyroscope in
+  massive rings (gimbals), modelled by bodies and hinges, and a disc with an unbalance on a flexible shaft.
 */
 #include "../../examples/problems/extrapolation.h"
 #include "../../examples/scene_watch.h"
@@ -22,8 +22,8 @@ struct Errors {
 };
 
 /*
-  The outer ring turns by psi about the vertical, the inner one in it by theta about x, the rotor in that by phi about z. With w = phi' + psi' cos
-  theta, which nothing changes, and s, c of theta
+  The outer ring rotates by psi about the vertical, the inner ring by theta about x of the outer ring, the rotor by phi about z of the inner ring.
+  With the constant w = phi' + psi' cos theta, and s, c = sin theta, cos theta
 
     D psi' + C w c = p,  D = Jo + (Iy + A) s^2 + Iz c^2,      (Ix + A) theta'' = psi'^2 s c (Iy + A - Iz) - C w psi' s + m g l s
 */
@@ -85,7 +85,7 @@ double errorOf(Gyroscope &exact, double end, double h, Rotations rotations)
 }
 
 /*
-  The shaft's end z = x + iy and its slope s, both complex, with the disc's centre of mass e from it (campbell.cpp has its frequencies):
+  Displacement z = x + iy of the shaft's end and slope s, both complex; the disc's centre of mass is at the distance e (campbell.cpp computes the frequencies):
 
     m (z'' - e speed^2 exp(i speed t)) + 12 EI/L^3 z - 6 EI/L^2 s = 0,      It s'' - i Ip speed s' - 6 EI/L^2 z + 4 EI/L s = 0
 */

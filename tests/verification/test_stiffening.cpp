@@ -73,16 +73,16 @@ TEST(Stiffening, Column)
 }
 
 /*
-  A thin strip under a force P in its plane and a small one across, q, which has a moment about the strip's axis once that bends across: with s from
-  the tip, GJ phi'' + P s^2 (q + P phi)/EI = 0 and EI v'' = s (q + P phi). So q + P phi = q f(s)/f(L) with GJ EI f'' + P^2 s^2 f = 0, f(0) = 1, f'(0) = 0;
-  it falls over where f(L) = 0, at P = 4.013 sqrt(EI GJ)/L^2 (Timoshenko, Gere, Theory of Elastic Stability, section 6.3). Ends that do not warp and the
-  bend in its plane raise that by some 4 %; by 2.6 % of a strip half as deep.
+  A thin strip under a force P in its plane and a small lateral force q. When the strip bends laterally, P has a moment about its axis: with s from
+  the tip, GJ phi'' + P s^2 (q + P phi)/EI = 0 and EI v'' = s (q + P phi). Hence q + P phi = q f(s)/f(L) with GJ EI f'' + P^2 s^2 f = 0, f(0) = 1, f'(0) = 0;
+  the strip buckles where f(L) = 0, at P = 4.013 sqrt(EI GJ)/L^2 (Timoshenko, Gere, Theory of Elastic Stability, section 6.3). Restrained warping at the
+  ends and the bending in the plane increase this load by about 4 %, and by 2.6 % for a strip of half the depth.
 */
 TEST(Stiffening, LateralBuckling)
 {
   const hhtex::SolidBeam b  = strip(0.025, 0.00125, 40, 4);
   const double           EI = b.material.young * b.Iyy(), root = std::sqrt(EI * b.shearModulus() * b.torsion()), across = 1e-5 * EI;
-  const auto             exact = [](double p) { /* times the deflection of q alone, p = P L^2/sqrt(EI GJ) */
+  const auto             exact = [](double p) { /* deflection relative to that of q alone, p = P L^2/sqrt(EI GJ) */
     double term = 1, f = 0, integral = 0;
     for (int k = 0; k < 20; k++) {
       if (k) term *= -p * p / (4. * k * (4. * k - 1));
