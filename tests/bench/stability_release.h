@@ -162,10 +162,10 @@ inline void AddReleases(Cases &cases)
     const char *name;
   } holds[] = {{Hold::Spring, "spring"}, {Hold::Damper, "damper"},   {Hold::Bushing, "bushing"},
                {Hold::Brake, "brake"},   {Hold::Contact, "contact"}, {Hold::Friction, "friction"}};
+  /* accept: a step over the jump of the acceleration misses a velocity of up to g h; error control permits
+     h = sqrt(eps/(k g)) */
   const struct {
     const char *name;
-    /* A step over the jump of the acceleration misses a velocity of up to g h; error control permits h = sqrt(eps/(k
-       g)) */
     double      eps, h, accept;
   } steps[] = {{"1e-3", 1e-3, 0, 0.12}, {"1e-6", 1e-6, 0, 4e-3}, {"1e-3, h<1e-3", 1e-3, -1e-3, 5e-3},
                {"1e-5, h=1e-3", 1e-5, 1e-3, 5e-3}, {"1e-5, h=1e-4", 1e-5, 1e-4, 5e-4}};

@@ -17,8 +17,7 @@ struct TSSettings {
   Stepper                           stepper = Stepper::HHT;
   std::function<PetscErrorCode(TS)> configure;                            /* called after TSSetType() */
   FirstOrder::Form                  form  = FirstOrder::Form::Stabilized; /* BDF */
-  /* hhtdae on scenes: Euler angles about axes chosen by the scene, instead of local rotation vectors */
-  bool                              euler = false;
+  bool                              euler = false; /* hhtdae on scenes: the scene's Euler angles in place of local rotation vectors */
   bool                              fixed = false; /* ALPHA2: constant steps of about 0.1 eps^0.4 of the run */
 };
 
