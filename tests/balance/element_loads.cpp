@@ -17,7 +17,7 @@ bool Ends(const ElementData &e, const std::string &with)
   return s.size() >= with.size() && s.compare(s.size() - with.size(), with.size(), with) == 0;
 }
 
-/* The joints of a coupler, each with its factor: factor times the multiplier is the moment or force on i's body */
+/* The joints of a coupler with their factors: factor times the multiplier is the moment or force on i's body */
 std::vector<Coupler::Term> Terms(const Specs &specs, PetscInt element)
 {
   if (const Gear *g = specs.of<Gear>(element)) return {{g->i1, g->j1, true, 1}, {g->i2, g->j2, true, g->ratio}};
@@ -62,7 +62,8 @@ ElementLoads::Place ElementLoads::at(Marker m) const
   return {b.r + arm, b.v + b.w.cross(arm), b.A * k.R};
 }
 
-/* On i's body, and the opposite at the same point on j's: action and reaction of an element without mass */
+/* Force and moment on i's body at x, and the opposite on j's body at the same point: action and reaction of a massless
+   element */
 void ElementLoads::pair(const ElementData &e, const Vector3 &x, const Vector3 &f, const Vector3 &m,
                         std::vector<Load> &loads) const
 {
@@ -81,7 +82,7 @@ void ElementLoads::coupler(PetscInt element, double multiplier, std::vector<Load
   }
 }
 
-/* A tension along the line between the origins */
+/* A tension along the line between the markers' origins */
 void ElementLoads::along(const ElementData &e, double tension, std::vector<Load> &loads) const
 {
   const Vector3 x = at(e.i).x, line = x - at(e.j).x;
@@ -89,7 +90,7 @@ void ElementLoads::along(const ElementData &e, double tension, std::vector<Load>
   if (l > 0) pair(e, x, -tension / l * line, Vector3::Zero(), loads);
 }
 
-/* Force and moment on i about its origin, in j's axes, or in the frame halfway on the turn from j to i */
+/* Force and moment on i about its origin, in j's axes, or (mean) in the frame halfway on the rotation from j to i */
 void ElementLoads::six(const ElementData &e, const Reading &r, bool mean, std::vector<Load> &loads) const
 {
   const Place i = at(e.i), j = at(e.j);
@@ -101,7 +102,7 @@ void ElementLoads::six(const ElementData &e, const Reading &r, bool mean, std::v
   pair(e, i.x, E * Three(r.component, 0), E * Three(r.component, 3), loads);
 }
 
-/* A moment about z_j, a force along it, or a moment in space axes, by the type of the joint that rubs */
+/* A moment about z_j, a force along z_j, or a moment in space axes, depending on the type of the joint with friction */
 void ElementLoads::friction(const ElementData &e, const Reading &r, std::vector<Load> &loads) const
 {
   const Place   i = at(e.i), j = at(e.j);
@@ -119,7 +120,7 @@ void ElementLoads::friction(const ElementData &e, const Reading &r, std::vector<
     pair(e, i.x, none, r.component[0] * axis, loads);
 }
 
-/* Where the bodies touch: the deepest point of shape i, between spheres the middle of the overlap */
+/* Contact point: the deepest point of shape i; between spheres the middle of the overlap */
 Vector3 ElementLoads::touch(PetscInt element) const
 {
   const ElementData &e = scene_.elements[(std::size_t)element];
@@ -132,7 +133,7 @@ Vector3 ElementLoads::touch(PetscInt element) const
   }
   if (const TorusPlane *s = specs_.of<TorusPlane>(element)) {
     const Vector3 axle = i.R.col(2), across = n - axle * axle.dot(n);
-    const double  y = across.squaredNorm() / 1e-6; /* one that lies flat touches in the middle of its ring, see TorusPlaneShape */
+    const double  y = across.squaredNorm() / 1e-6; /* a disc that lies flat touches in the middle of its ring, see TorusPlaneShape */
     return i.x - s->radius * (y < 1 ? Vector3(1e3 * (1.5 - 0.5 * y) * across) : across.normalized()) - s->tube * n;
   }
   if (const SphereSphere *s = specs_.of<SphereSphere>(element)) {

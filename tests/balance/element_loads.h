@@ -16,7 +16,7 @@ using hhtdae::Marker;
 using hhtdae::Matrix3;
 using hhtdae::Vector3;
 
-/* A body as its channels show it, space axes */
+/* A body as its channels show it, in space axes */
 struct Pose {
   Vector3 r = Vector3::Zero(), v = Vector3::Zero(), a = Vector3::Zero(); /* centre of mass */
   Matrix3 A = Matrix3::Identity();
@@ -29,10 +29,10 @@ struct Load {
   Vector3  at, force, moment;
 };
 
-/* What the channels of one element have read */
+/* Values of the channels of one element */
 struct Reading {
-  Vector3 force = Vector3::Zero(), moment = Vector3::Zero(); /* joints, motions: on i's body, space axes, about i */
-  std::vector<double> component;                             /* of a force; multipliers of a coupler */
+  Vector3 force = Vector3::Zero(), moment = Vector3::Zero(); /* joints and motions: on i's body, in space axes, about i */
+  std::vector<double> component;                             /* components of a force, or multipliers of a coupler */
 };
 
 class ElementLoads
@@ -43,11 +43,11 @@ public:
   {
   }
 
-  /* Whether the loads of an element can be told: false for types that this file does not know, or that need a
-     description which is not at hand */
+  /* Whether the loads of an element can be computed: false for types that this file does not know, or that need a
+     description which is not in `specs` */
   static bool known(const hhtdae::SceneData &scene, const Specs &specs, PetscInt element);
   static bool couples(const hhtdae::SceneData &scene,
-                      PetscInt                 element); /* gears, racks, couplers: read by multipliers */
+                      PetscInt                 element); /* gears, racks and couplers: from multipliers */
 
   void add(PetscInt element, const Reading &r, std::vector<Load> &loads) const;
 

@@ -26,7 +26,7 @@ NewtonEuler::NewtonEuler(Scene &scene, const Specs &specs)
   kinetic_ = scene.channel("balance kinetic", Measure::kineticEnergy()).id;
 }
 
-/* Channels of the components 0, 1, 2; the first one's place */
+/* Adds channels of the components 0, 1, 2; returns the index of the first */
 template <class Make> int NewtonEuler::three(const Make &make)
 {
   const int first = (int)DataOf(scene_).channels.size();
@@ -54,7 +54,7 @@ void NewtonEuler::look(PetscInt b)
   k.turning = three([&](int c) { return Measure::angularAcceleration(cm, c); });
 }
 
-/* An element whose loads cannot be told: none of its bodies is judged */
+/* An element whose loads are unknown: none of its bodies is judged */
 void NewtonEuler::leaveOut(PetscInt element)
 {
   const SceneData &s = DataOf(scene_);
@@ -184,8 +184,8 @@ std::vector<BodyBalance> NewtonEuler::bodies(const std::vector<double> &values) 
   return all;
 }
 
-/* The largest of amounts of force and moment against the loads on the body itself; where those are nothing but rounding,
-   against a billionth of the largest on any body, and moments against a billionth of the forces at the radius of
+/* The largest ratio of force or moment amounts to the loads on the body itself. If these are only rounding errors, the
+   ratio is to 1e-9 of the largest loads on any body; for moments also to 1e-9 of the forces times the radius of
    gyration */
 template <class Amounts> Imbalance NewtonEuler::largest(const std::vector<BodyBalance> &all, const Amounts &amounts) const
 {
@@ -197,7 +197,7 @@ template <class Amounts> Imbalance NewtonEuler::largest(const std::vector<BodyBa
   }
   const auto hold = [&](double missing, double sum, double least, const char *what, PetscInt body) {
     const double ratio = missing <= 0 ? 0 : missing / std::max(sum, 1e-9 * least);
-    const double part  = std::isnan(ratio) ? INFINITY : ratio; /* what is no number exceeds all others */
+    const double part  = std::isnan(ratio) ? INFINITY : ratio; /* NaN counts as larger than all others */
     if (part <= worst.largest) return;
     worst.largest = part;
     worst.where   = std::string(what) + " on " + DataOf(scene_).bodyName(body);
@@ -206,7 +206,7 @@ template <class Amounts> Imbalance NewtonEuler::largest(const std::vector<BodyBa
     const double                    gyration = k.mass > 0 ? std::sqrt(k.inertia / k.mass) : 0;
     const std::pair<double, double> missing  = amounts(k);
     hold(missing.first, k.forces, force, "force", k.body);
-    /* where moments have died out rounding of forces times their arms is left of them */
+    /* moments that have decayed are rounding errors of forces times lever arms */
     hold(missing.second, std::max(k.moments, 1e-6 * gyration * k.forces), moment, "moment", k.body);
   }
   return worst;
@@ -296,7 +296,7 @@ double NewtonEuler::kinetic(const std::vector<double> &values) const
     if (d.massless || d.flexible) continue;
     sum += 0.5 * d.mass * pose[b].v.squaredNorm();
     if (d.point) continue;
-    const Vector3 w = pose[b].A.transpose() * pose[b].w; /* about z alone in a planar scene */
+    const Vector3 w = pose[b].A.transpose() * pose[b].w; /* about z only in a planar scene */
     sum += 0.5 * w.dot(d.inertia * w);
   }
   return sum;

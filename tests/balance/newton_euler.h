@@ -4,18 +4,18 @@
 
     m a = sum of forces + m g,    J alpha + w x J w = sum of moments about the centre of mass,
 
-  mass and inertia as described. With them comes the balance of power: the kinetic energy that the scene reports has to
-  be that of the bodies as they move, whose rate the loads are by these laws. It shares with the scene the description
-  and the channels, nothing of the residual: a load that does not act as it is reported, or acts on one body alone,
-  leaves a body out of balance.
+  with mass and inertia as described. In addition the balance of power is checked: the kinetic energy that the scene
+  reports must be that of the moving bodies, and its rate must be the power of all loads. Only the description and the
+  channels are shared with the scene, not the residual: if a load acts differently from what is reported, or on one body
+  only, a body is out of balance.
 
     NewtonEuler laws(scene, specs);            after everything has been described, before the scene is set up: adds
   channels scene.sample(ts, t, values); laws.judge(values).largest                 0: in balance; 1: what is missing is
   as large as all forces together
 
-  Not judged: flexible bodies, whose inertia no channel shows (the frames of their attachments are, for forces: the
-  multipliers of an attachment's first three rows are the force on its frame with the opposite sign), and bodies on
-  which an element acts that ElementLoads does not know.
+  Not judged are bodies on which an element acts that ElementLoads does not know, and flexible bodies, whose inertia no
+  channel shows. The forces on the frames of their attachments are judged: the multipliers of an attachment's first three
+  rows are the force on its frame with the opposite sign.
 */
 #ifndef HHTDAE_TESTS_BALANCE_NEWTON_EULER_H
 #define HHTDAE_TESTS_BALANCE_NEWTON_EULER_H
@@ -25,31 +25,31 @@
 namespace hhtest
 {
 
-/* Of one body: what is left of the sum of forces, and all of them in absolute values; the same of moments */
+/* For one body: remaining sum of forces, and sum of their absolute values; the same for moments */
 struct BodyBalance {
   PetscInt body;
   Vector3  force = Vector3::Zero(), moment = Vector3::Zero();
   double   forces = 0, moments = 0, mass = 0, inertia = 0;
 };
 
-/* What an integrator has left of the equations of motion of a body, m r'' - f and J w' + w x J w - m, by the residual that
-   it has solved, and how much it may leave */
+/* What an integrator has left of the equations of motion of a body, m r'' - f and J w' + w x J w - m, according to the
+   residual that it has solved, and how much it may leave */
 struct BodyResidual {
   Vector3 force = Vector3::Zero(), moment = Vector3::Zero();
   double  force_allowed = 0, moment_allowed = 0;
-  double  force_rounding = 0, moment_rounding = 0; /* of loads evaluated twice */
+  double  force_rounding = 0, moment_rounding = 0; /* rounding of loads that are evaluated twice */
 };
 
 struct Imbalance {
-  double      largest = 0; /* of |what is left| over the sum of absolute values, of forces and moments of all bodies */
-  std::string where;       /* "moment on arm" */
+  double      largest = 0; /* largest ratio, over forces and moments of all bodies, of the remaining amount to the sum of absolute values */
+  std::string where;       /* for example "moment on arm" */
 };
 
-/* Powers at one time, of the loads by which elements act on bodies and of gravity */
+/* Powers at one time of the loads of elements on bodies, and of gravity */
 struct Powers {
-  double joints = 0, motions = 0, forces = 0, gravity = 0; /* joints: zero, as no joint moves by itself */
+  double joints = 0, motions = 0, forces = 0, gravity = 0; /* joints: zero, because constraints that do not depend on time do no work */
   double of_joints = 0,
-         absolute  = 0; /* the same with every load along its velocity: what the sums above are measured against */
+         absolute  = 0; /* the same with all powers taken as positive, as the scale of the sums above */
   double all() const { return joints + motions + forces + gravity; } /* the rate of kinetic energy */
 };
 
@@ -59,19 +59,19 @@ public:
   NewtonEuler(hhtdae::Scene &scene, const Specs &specs);
 
   std::vector<BodyBalance> bodies(const std::vector<double> &values) const;
-  /* what is missing beyond the residuals `left`; none: nothing is left */
+  /* the imbalance beyond the residuals `left`; without these, the whole imbalance */
   Imbalance judge(const std::vector<double> &values, const std::vector<BodyResidual> &left = {}) const;
-  /* by what the residuals exceed what they may be */
+  /* the amount by which residuals exceed what they may be */
   Imbalance unsolved(const std::vector<double> &values, const std::vector<BodyResidual> &left) const;
   Powers    powers(const std::vector<double> &values) const;
   std::vector<double>
-  magnitudes(const std::vector<double> &values) const; /* of the loads of each element: their largest force or moment */
-  double kinetic(const std::vector<double> &values) const; /* energy of the rigid bodies and points */
-  int    judged() const;                                   /* bodies */
+  magnitudes(const std::vector<double> &values) const; /* largest force or moment of each element */
+  double kinetic(const std::vector<double> &values) const; /* kinetic energy of the rigid bodies and points */
+  int    judged() const;                                   /* number of bodies judged */
   const std::vector<std::string> &unknown() const
   {
     return unknown_;
-  } /* types of elements whose loads cannot be told */
+  } /* types of elements whose loads are not known */
 
 private:
   struct OfBody {
@@ -88,7 +88,7 @@ private:
   Marker                   origin_;
   std::vector<OfBody>      body_;
   std::vector<OfElement>   element_;
-  int                      kinetic_ = -1; /* channel; -1: the scene has flexible bodies */
+  int                      kinetic_ = -1; /* channel; -1 if the scene has flexible bodies */
   std::vector<std::string> unknown_;
 
   template <class Make> int three(const Make &make);

@@ -24,7 +24,7 @@ public:
     return e;
   }
   template <class Spec> void keep(hhtdae::Element e, const Spec &spec) { all_[e.id] = spec; }
-  /* null: the element was added in another way, or is of another type */
+  /* null: the element was added without specs, or is of another type */
   template <class Spec> const Spec *of(PetscInt element) const
   {
     const auto at = all_.find(element);

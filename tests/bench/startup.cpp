@@ -9,7 +9,7 @@
   Debian 12 with its PETSc 3.18 and Open MPI 4.1, smallest of several times on two cores shared with five other processes, ms:
 
                                               cpu   by the clock
-      dynamic linking                          66                  109 libraries, 107 of them PETSc's; an eighth of this time with a PETSc that needs 27
+      dynamic linking                          66                  109 libraries, 107 of them PETSc's; an eighth with a PETSc that needs 27
       MPI_Init(), MPI_Finalize()               47   457, 57        isolated: 45, 280, 8
       PetscInitialize(), PetscFinalize()        1     1
       first scene                             5.2   5.2            2 of them first use of TS, SNES, KSP and Mat

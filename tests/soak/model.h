@@ -1,5 +1,5 @@
-/* Model k of seed s: a scene put together at random from trees, loops, machines, contacts and flexible bodies, with
- * what is observed. */
+/* Model k of seed s: a scene generated at random from trees, loops, machines, contacts and flexible bodies, with its
+   observed channels */
 #ifndef HHTDAE_SOAK_MODEL_H
 #define HHTDAE_SOAK_MODEL_H
 
@@ -17,14 +17,14 @@ enum class Observed { Position, Velocity, Reaction, Energy };
 
 struct Model {
   std::shared_ptr<Scene> scene;
-  hhtest::Specs          specs; /* of its elements, for the balances */
+  hhtest::Specs          specs; /* descriptions of its elements, for the balances */
   bool                   planar = false, conservative = false, switched = false;
   int                    bodies = 0;
   double                 end = 0, length = 1, mass = 1, period = 1, stiffest = 0, softest = 0, speed = 0;
-  double                 jump = 0; /* acceleration with which what is let go sets off; 0: nothing is */
+  double                 jump = 0; /* acceleration of an element after its release; 0: nothing is released */
   Impact                 impact; /* of hard contacts */
-  std::vector<Observed>  observed;  /* what each channel of the scene is */
-  std::map<std::string, int> types; /* elements by type, and features */
+  std::vector<Observed>  observed;  /* kind of each channel of the scene */
+  std::map<std::string, int> types; /* numbers of elements by type, and of features */
 };
 
 class Generator
@@ -67,10 +67,10 @@ public:
   }
 
 private:
-  Random r, later_, extra_; /* the latter two: of what was added to the models later, so that the rest stays as it was */
+  Random r, later_, extra_; /* the latter two generate what was added to the models later, so that the rest is unchanged */
   bool   small_, switches_, extras_;
   const std::vector<ReducedPart> &parts_;
-  const Vector3 push_; /* a small change of gravity and places, in parts of them: the same model, disturbed */
+  const Vector3 push_; /* a small change of gravity and positions, relative to their size, which gives the same model disturbed */
 
   void scales(Builder &b)
   {
@@ -86,7 +86,7 @@ private:
     b.scene.gravity(b.gravity + more);
   }
 
-  /* small ones are the most, a few have 100 to 200 bodies */
+  /* most models are small, a few have 100 to 200 bodies */
   int size()
   {
     if (small_) return (int)r.logarithmic(1, 8);
@@ -181,7 +181,7 @@ private:
     std::swap(r, extra_);
   }
 
-  /* In two of five models, last, with random numbers of their own */
+  /* Adds switches to two of five models, at the end and with a separate random generator */
   void addSwitches(Builder &b, Model &m)
   {
     if (!switches_ || !later_.chance(0.4)) return;
@@ -202,7 +202,7 @@ private:
     b.lossy    = true;
   }
 
-  /* by elements that take or give energy as such; springs with damping are known to the builder */
+  /* whether it contains elements that dissipate or supply energy by their type; the builder knows springs with damping */
   static bool dissipates(const Scene &s)
   {
     static const char *const takes[] = {"motion", "friction", "user", "beam", "contact", "stop", "nonlinear", "attachment"};

@@ -1,7 +1,5 @@
-/*
-  What the generators of models share: the scene under construction, its bodies with pose and mass, joints that may be
-  driven or rubbed, scales of length, time and speed from which stiffness, damping and forces are drawn.
-*/
+/* Shared by the generators of models: the scene under construction; its bodies with pose and mass; joints that may be
+   driven or have friction; scales of length, time and velocity from which stiffness, damping and forces are drawn */
 #ifndef HHTDAE_SOAK_MODEL_BUILDER_H
 #define HHTDAE_SOAK_MODEL_BUILDER_H
 
@@ -20,10 +18,10 @@ namespace soak
 
 using namespace hhtdae;
 
-/* A body and where it is at the start; entry 0 is the ground */
+/* A body and its initial position; entry 0 is the ground */
 struct Placed {
   Body    body;
-  Vector3 at; /* centre */
+  Vector3 at; /* position of the centre */
   Matrix3 axes;
   double  mass, size; /* size: a typical length */
   bool    point = false, flexible = false;
@@ -34,7 +32,7 @@ struct Held {
   Element joint;
   Marker  i, j;
   Kind    kind;
-  bool    free; /* nothing else determines its motion: it may be driven */
+  bool    free; /* nothing else determines its motion, so that it may be driven */
   double  mass, size;
 };
 
@@ -49,17 +47,17 @@ public:
   Scene                     &scene;
   Random                    &random;
   const bool                 planar;
-  hhtest::Specs              specs; /* of the elements, for the balances */
+  hhtest::Specs              specs; /* descriptions of the elements, for the balances */
   std::vector<Placed>        placed;
   std::vector<Held>          held;
-  std::map<std::string, int> used;                             /* what elements do not show by their type */
+  std::map<std::string, int> used;                             /* numbers of features that the types of elements do not show */
   double                     length = 1, mass = 1, period = 2; /* scales of the model */
-  double                     speed   = 0;     /* of bodies at the start, 0: at rest; times length per period */
-  bool                       lossy   = false; /* energy is not kept */
-  bool                       project = false; /* initial velocities have to be made consistent */
+  double                     speed   = 0;     /* initial speed of bodies in lengths per period; 0: at rest */
+  bool                       lossy   = false; /* energy is not conserved */
+  bool                       project = false; /* initial velocities must be projected onto the constraints */
   Vector3                    up, gravity;
   double                     stiffest = 0, softest = 1e300;
-  Vector3 push = Vector3::Zero(); /* a small disturbance of where bodies and points are, in lengths of the model */
+  Vector3 push = Vector3::Zero(); /* a small displacement of bodies and points, in lengths of the model */
 
   Builder(Scene &s, Random &r, bool plane)
       : scene(s), random(r), planar(plane), up(plane ? Vector3(0, 1, 0) : Vector3(0, 0, 1))
@@ -71,7 +69,7 @@ public:
 
   template <class Spec> Element add(const Spec &spec) { return specs.add(scene, "", spec); }
 
-  /* ---- places ---- */
+  /* ---- positions and axes ---- */
   Vector3 direction()
   {
     const Vector3 d = random.direction();
@@ -106,7 +104,7 @@ public:
   {
     return scene.markerAt(placed[b].body, x, R);
   }
-  /* any point of body b */
+  /* a random point of body b */
   Vector3 on(int b)
   {
     const Placed &p = placed[b];
@@ -116,7 +114,7 @@ public:
     return p.at + (b == 0 ? 2 : 0.5) * p.size * d + disturbance();
   }
 
-  /* this way and that, so that it is no motion of the whole */
+  /* in alternating directions, so that it is not a motion of the whole model */
   Vector3 disturbance()
   {
     Vector3 d = (pushed_++ % 2 ? -length : length) * push;
@@ -140,7 +138,7 @@ public:
     b.inertia  = inertia;
     b.rotation = R;
     b.position = x;
-    if (random.chance(0.2)) { /* origin apart from the centre of mass */
+    if (random.chance(0.2)) { /* an origin other than the centre of mass */
       b.center = 0.2 * size * random.vector();
       if (planar) b.center(2) = 0;
       b.position = x - R * b.center;
@@ -183,8 +181,8 @@ public:
   }
 
   /* ---- scales ---- */
-  /* of a frequency from about that of the model to 1e4 times that; what is fast is damped, as a few periods of the
-   * model are run */
+  /* with a frequency between about that of the model and 1e4 times that; fast ones are damped, because the runs last
+     only a few periods of the model */
   Stiff stiff(double m)
   {
     Stiff        s;
@@ -203,7 +201,7 @@ public:
     return s;
   }
   double inertia(int b) const { return 0.08 * placed[b].mass * placed[b].size * placed[b].size; }
-  /* the lighter of two, of which one may be the ground */
+  /* mass of the lighter of two bodies, one of which may be the ground */
   double lighter(int a, int b) const
   {
     return a == 0 ? placed[b].mass : b == 0 ? placed[a].mass : std::min(placed[a].mass, placed[b].mass);
@@ -214,7 +212,7 @@ public:
   }
   double weightPerMass() const { return std::max(gravity.norm(), length / (period * period)); }
   double weight(int b) const { return placed[b].mass * weightPerMass(); }
-  bool   state(double p = 0.15) /* carry a force as force states */
+  bool   state(double p = 0.15) /* whether to use a force state */
   {
     const bool yes = random.chance(p);
     if (yes) used["force state"]++;

@@ -6,11 +6,11 @@
 namespace soak
 {
 
-/* Which models are made */
+/* Which models are generated */
 struct Choice {
-  bool small    = false; /* of few bodies alone */
-  bool switches = true;  /* stiff elements that let go or take hold, in two of five */
-  bool extras   = false; /* elements of model_extras.h, in each */
+  bool small    = false; /* few bodies only */
+  bool switches = true;  /* stiff elements that are released or engaged, in two of five models */
+  bool extras   = false; /* elements of model_extras.h in each model */
 
   std::string options() const { return std::string(small ? " -small" : "") + (switches ? "" : " -switches 0") + (extras ? " -extras" : ""); }
 };

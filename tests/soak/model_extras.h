@@ -1,4 +1,4 @@
-/* What -extras adds to a model: stops and ropes, links without mass, joints that are given as expressions. */
+/* The elements that -extras adds to a model: stops and ropes, massless links, joints given by expressions */
 #ifndef HHTDAE_SOAK_MODEL_EXTRAS_H
 #define HHTDAE_SOAK_MODEL_EXTRAS_H
 
@@ -39,7 +39,7 @@ private:
   int base() { return b.bodies() && r.chance(0.6) ? b.anyRigid() : 0; }
   int axis() const { return b.planar ? 0 : 2; }
 
-  /* of a coordinate whose inertia is given, which travels that far */
+  /* contact law for a coordinate with this inertia and this travel */
   ContactLaw law(double inertia, double travel)
   {
     const Stiff s = b.stiff(inertia);
@@ -92,7 +92,7 @@ private:
     b.add(s);
   }
 
-  /* a body on a link between two pins, or a ball and a universal joint */
+  /* a body on a massless link between two pins, or between a spherical and a universal joint */
   void massless()
   {
     const int     from = base();
@@ -159,7 +159,7 @@ private:
     b.project = b.project || b.speed > 0;
   }
 
-  /* a slide whose speed follows the time */
+  /* a slide whose velocity is a function of time */
   void servo()
   {
     const Pair   p = hung(b.axes());

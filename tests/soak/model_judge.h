@@ -1,33 +1,37 @@
 /*
-  What becomes of one model: the run with defaults (tolerance 1e-4), a run at a tenth of it, two references, and the
-  verdict.
+  Judgement of one model: the run with default settings (tolerance 1e-4), a run at a tenth of this tolerance, two
+  references, and the verdict.
 
-  Error of a position: |x - x_ref| / max(1, largest |x_ref| of that channel so far), the weights of the method's own
-  test.
+  Error of a position: |x - x_ref| / max(1, largest |x_ref| of that channel so far), with the weights of the method's
+  error test.
 
   A run at tolerance eps is right if at every sample time t
 
     error(t) <= eps (N(t) + 50) (10 + 3 G(t)) + 3 t sqrt(eps n^(1/2) a / k) + 3 (t - t_c) min(2 v, eps n^(1/2) w),
 
-  N: its steps so far, each of which may leave an error of eps, and 50 for the start and impacts; G: how much the model
-  itself makes grow of an error, as IDA shows it: the difference of its runs at tolerances 10 eps_ref and eps_ref, over
-  10 eps_ref. The second part is for what lets go with an acceleration a (the weight; loads of others make it more, hence
-  the 3): a step h over the jump of it misses a velocity of up to a h, and the error test lets
-  h = sqrt(eps n^(1/2) / (k a)) pass (k of (26), 0.1; the n coordinates share one norm). The last one is for hard contacts of frequency w,
-  met at t_c with the speed v: the error test lets h^3 = eps n^(1/2) / (k v w^2) pass, and of the speed the method's damping
-  takes some tenth of (h w)^3; where the depth v/w is below the tolerance, all of it. It is asked for as long as the
-  right-hand side is below 1: later the tolerance does not determine the solution. Where that is so before the end, a third run, at eps / 100, has to be right by the same formula. Where an
-  error is larger, gravity, bodies and points are moved by eps N / 2 in six directions: a model which that moves as far
-  (a third as far at least) is one whose solution eps does not determine from there on, near a separatrix. One that is right from
-  a first step in which nothing moves has missed the blow of what holds it at once at the start: it is counted by itself. And where the
-  first error is above 1e-3, that of the second run has to be smaller, or else that of the third; where neither is, that
-  of a run at eps / 1000 has to be smaller than both the first and the third, or a sharper reference nearer to it.
+  N: number of steps so far, each of which may leave an error of eps, and 50 for the start and impacts. G: growth of
+  errors by the model itself, estimated by IDA: the difference of its runs at tolerances 10 eps_ref and eps_ref, over
+  10 eps_ref.
 
-  Besides, constraints have to hold to eps, and the reference has to keep the energy of a model that has no losses.
+  The second term is for elements that are released with an acceleration a (the weight; other loads increase it, hence the
+  factor 3): a step h over this jump misses a velocity of up to a h, and the error test accepts
+  h = sqrt(eps n^(1/2) / (k a)) (k of (26), 0.1; the n coordinates share one norm). The third term is for hard contacts of
+  frequency w, reached at t_c with the speed v: the error test accepts h^3 = eps n^(1/2) / (k v w^2), and the method's
+  damping takes about a tenth of (h w)^3 of the speed, or all of it where the depth v/w is below the tolerance.
 
-  What shares nothing with residual and reference is judged as well, model_laws.h: the laws of Newton and Euler for
-  every body; and what is no matter of accuracy: the model described and run again, a checkpoint written half way and
-  gone on from, all of them digit for digit.
+  The formula is applied as long as its right-hand side is below 1; beyond, the tolerance does not determine the solution.
+  If that happens before the end, a third run, at eps / 100, must be right by the same formula. If an error is larger,
+  gravity, bodies and points are displaced by eps N / 2 in six directions: if that moves the model as far (at least a third
+  as far), eps does not determine its solution from there on, since it is near a separatrix. A model that is right with a
+  first step in which nothing moves has missed the impact of an element that stops it at the start: it is counted
+  separately. If the error of the first run is above 1e-3, that of the second run must be smaller, or else that of the
+  third; if neither is, the error of a run at eps / 1000 must be smaller than both the first and the third, or a sharper
+  reference must be nearer to the run.
+
+  In addition constraints must be satisfied to eps, and the reference must conserve the energy of a model without losses.
+
+  Judgements that do not use the residual or a reference are in model_laws.h: the laws of Newton and Euler for every body;
+  and, equal to the last digit, the model described and run again, and a checkpoint written half way and resumed.
 */
 #ifndef HHTDAE_SOAK_MODEL_JUDGE_H
 #define HHTDAE_SOAK_MODEL_JUDGE_H
@@ -71,8 +75,8 @@ public:
 
 private:
   static constexpr double per_step = 10, per_growth = 3, undetermined = 1, reference_eps = 1e-7;
-  static constexpr double no_motion   = 1e-14; /* first step, in periods */
-  static constexpr double default_eps = 1e-4; /* PETSc's, and so the library's */
+  static constexpr double no_motion   = 1e-14; /* length of the first step in periods */
+  static constexpr double default_eps = 1e-4; /* default of PETSc and of the library */
 
   std::uint64_t                             seed_;
   Choice                                    choice_;
@@ -81,10 +85,10 @@ private:
   Model                                     model_;
   Outcome                                  &o_;
   Trajectory                                looser_, reference_;
-  std::map<double, std::vector<Trajectory>> disturbed_; /* by how much */
-  bool                                      sharpened_[3] = {}; /* by who refers */
-  std::string                               moves_; /* how the reference moves as it is sharpened, if it does */
-  double finest_ = 0; /* error at the smallest tolerance, where the default was judged */
+  std::map<double, std::vector<Trajectory>> disturbed_; /* by the size of the disturbance */
+  bool                                      sharpened_[3] = {}; /* by the kind of reference */
+  std::string                               moves_; /* how far the reference moved when it was sharpened, if it did */
+  double finest_ = 0; /* error at the smallest tolerance at which the span of the default run was judged */
 
   Model build(const Vector3 &push = Vector3::Zero()) const
   {
@@ -97,7 +101,7 @@ private:
     SetText(o_.message, sizeof o_.message, why);
   }
 
-  /* of the difference to the reference: of none, where that moves */
+  /* of a difference to the reference; not if the reference itself still moves */
   void complain(const std::string &what)
   {
     if (moves_.empty()) fail(Wrong, what);
@@ -133,7 +137,7 @@ private:
     o_.slip           = a.slip < 0 ? -1 : a.slip * model_.period / ((1 + model_.speed) * model_.length);
   }
 
-  /* ---- what is no matter of accuracy ---- */
+  /* ---- judgements that do not depend on accuracy ---- */
 
   void laws()
   {
@@ -181,7 +185,7 @@ private:
     o_.reference_steps = reference_.steps;
   }
 
-  /* Another method of the same family, at two small tolerances */
+  /* Reference by hhtdae itself with another spectral radius, at two small tolerances */
   void referToItself()
   {
     Settings tight;
@@ -195,8 +199,8 @@ private:
     if (looser_.arrived() && reference_.arrived()) o_.by = ByHHT;
   }
 
-  /* An invariant of the reference, where the model has one: energy, relative to what goes to and fro; it has to be kept
-     to a thousandth */
+  /* An invariant of the reference, if the model has one: energy, relative to the energy exchanged; it must be
+     conserved to 1e-3 */
   bool keepsEnergy()
   {
     const std::size_t kinetic = model_.observed.size() - 2, potential = kinetic + 1;
@@ -208,7 +212,7 @@ private:
       most  = std::max(most, x[kinetic] + x[potential]);
       moved = std::max(moved, x[kinetic]);
     }
-    /* what never moves has no energy to lose: a hundredth of what the scales of the model would move */
+    /* scale for models at rest, which have no energy to lose: a hundredth of a motion with the scales of the model */
     const double v = 0.01 * model_.length / model_.period;
     o_.energy      = (most - least) / std::max(moved, model_.mass * v * v);
     return o_.energy < 1e-3;
@@ -222,7 +226,7 @@ private:
     for (int l = 0; l <= k; l++) w = std::max(w, std::abs(reference_.x[(std::size_t)l][channel]));
     return w;
   }
-  /* of positions, at sample k */
+  /* error of positions at sample k */
   double error(const Trajectory &a, int k) const
   {
     double worst = 0;
@@ -239,7 +243,7 @@ private:
     for (int k = 0; k < samples; k++) worst = std::max(worst, error(a, k));
     return worst;
   }
-  /* of velocities or reactions, relative to the largest of all; the mean over time, as they may jump */
+  /* error of velocities or reactions relative to the largest value of all; the mean over time, because they may jump */
   double meanError(const Trajectory &a, Observed kind) const
   {
     double largest = 0, sum = 0;
@@ -271,7 +275,7 @@ private:
            3 * after * std::min(2 * model_.impact.speed, shared * model_.impact.frequency);
   }
 
-  /* Samples for which the tolerance determines the solution; of these, whether all are right */
+  /* Number of samples at which the tolerance determines the solution; and whether all of these are right */
   int window(double eps, const Trajectory &a) const
   {
     int k = 0;
@@ -299,7 +303,7 @@ private:
     }
     return true;
   }
-  /* Whether the model is right where the first step is one in which nothing moves: then the blow at its start is what was missed */
+  /* Whether the model is right with a first step in which nothing moves: then the impact at its start was missed */
   bool rightFromASmallStep(double eps, int n)
   {
     Settings small;
@@ -312,7 +316,7 @@ private:
       if (error(b, k) > allowed(eps, b, k)) return false;
     return b.arrived();
   }
-  /* How far the reference moves until sample k if gravity, bodies and points are moved */
+  /* Displacement of the reference up to sample k if gravity, bodies and points are disturbed */
   double disturbance(double by, int k)
   {
     std::vector<Trajectory> &all = disturbed_[by];
@@ -381,11 +385,12 @@ private:
     if (o_.verdict == Right && !falls && !(finest_ < 0.7 * first)) stillFalls(first, second);
   }
 
-  /* Before a model is called wrong: a sharper reference, one of each kind. A reference that still moves by a tenth of what is complained of
-     proves nothing against a model. IDA's matrix may be older than the end of a brake, which it then does not see: its iteration goes on for
-     longer. Where it cannot be sharpened at all hhtdae's own takes its place. That is made from a first step in which nothing moves: where a
-     damper holds at once what moves at the start, and joints have friction, the blow on them depends on how it comes about, in times and ways
-     that no tolerance of positions sees. */
+  /* Before a model is called wrong its reference is sharpened, once for each kind. A reference that still moves by a
+     tenth of the difference in question proves nothing against a model. IDA's matrix may be older than the release of
+     a brake, and IDA then does not notice the release: its iteration is continued to a smaller tolerance. If IDA's
+     reference cannot be sharpened at all, hhtdae's own takes its place, with a first step in which nothing moves:
+     where a damper stops a moving body at the start and joints have friction, the impact on them depends on details in
+     time that no tolerance of positions resolves */
   bool sharpen(double complaint)
   {
     const By   by      = (By)o_.by;
@@ -398,7 +403,7 @@ private:
     const double differ = error(looser_);
     std::swap(reference_, sharper);
     const double moved = error(sharper);
-    const bool   less  = by == ByIDA && moved <= 0.3 * differ; /* than over the power of ten before */
+    const bool   less  = by == ByIDA && moved <= 0.3 * differ; /* compared with the change over the power of ten before */
     if (!less && moved > 0.1 * complaint) moves_ = hhtbench::Text("the reference moves by %.1e with its %s", moved, by == ByIDA ? "tolerance" : "first step");
     return true;
   }
@@ -431,8 +436,8 @@ private:
     std::swap(reference_, reference);
     return false;
   }
-  /* Times of impacts and stops scatter: errors of neighbouring tolerances may be the other way round. A thousandth
-   * decides. */
+  /* Times of impacts and stops scatter, so that errors of neighbouring tolerances may be in reverse order; a
+     thousandth of the tolerance decides */
   void stillFalls(double first, double second)
   {
     Settings s;
@@ -446,7 +451,7 @@ private:
     complain(hhtbench::Text("the error does not fall with the tolerance: %.2e, then %.2e, %.2e and %.2e", first, second, finest_, last));
   }
 
-  /* for a model that is looked at alone: errors over tolerances, of both kinds of damping */
+  /* For a model that is run alone: errors over tolerances, for both kinds of damping */
   void converge()
   {
     for (double eps = default_eps; eps > 2e-9; eps *= 0.1)

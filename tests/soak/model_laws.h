@@ -1,12 +1,12 @@
 /*
   Judgements that need no reference: the laws of Newton and Euler for every body, from channels
-  (balance/newton_euler.h); the model described and run a second time in the same process; a checkpoint half way,
-  written and gone on from with a scene and a TS of their own.
+  (balance/newton_euler.h); the model described and run a second time in the same process; a checkpoint written half way
+  and resumed with another scene and another TS.
 
-  The balance by channels is held against the residual of the scene at the same state: what is left of the forces and
-  moments on a body by the one has to be left by the other, however far the corrector went, relative to all of them in
-  absolute values. And the residual itself has to be solved, beyond what a corrector of c = 1e-9 may leave and what
-  does not move positions, see model_residual.h.
+  The imbalance of a body according to its channels is compared with the residual of the scene at the same state: both must
+  agree, however far the corrector has iterated, relative to the sum of the absolute values of all loads. The residual
+  itself must be zero except for what a corrector with c = 1e-9 may leave and for what does not move positions, see
+  model_residual.h.
 */
 #ifndef HHTDAE_SOAK_MODEL_LAWS_H
 #define HHTDAE_SOAK_MODEL_LAWS_H
@@ -25,18 +25,19 @@ inline Settings LawSettings(double work)
   Settings s;
   s.corrector = 1e-9;
   s.tolerance = 1e-4;
-  s.slack     = 1e3 * s.corrector * s.tolerance; /* the measured rate is that of the largest corrections; in stiff directions, where
-                                                    they are small, the iteration may be far slower */
+  /* The measured rate is that of the largest corrections. In stiff directions, where corrections are small, the
+     iteration may converge far more slowly */
+  s.slack     = 1e3 * s.corrector * s.tolerance;
   s.laws      = true;
   s.work      = work;
   return s;
 }
 
 struct Repeated {
-  bool again = false, resumed = false; /* digit for digit */
+  bool again = false, resumed = false; /* equal to the last digit */
 };
 
-/* The first difference of two runs from sample `from` on, empty: none */
+/* The first difference between two runs from sample `from` on; empty: none */
 inline std::string Difference(const Trajectory &a, const Trajectory &b)
 {
   if (!b.arrived()) return b.failure;
@@ -58,7 +59,7 @@ template <class Build> Repeated Repeat(const Build &build, const Trajectory &a, 
   const std::string file = hhtbench::Text("%s/soak-%ld.checkpoint", scratch, (long)getpid());
   Settings          s;
   s.options         = options;
-  const Model first = build(), second = build(); /* both described before either runs */
+  const Model first = build(), second = build(); /* both are described before either is run */
   std::string different = Difference(a, RunHHT(first, s));
   r.again               = different.empty();
   if (!r.again) *why = "run again: " + different;

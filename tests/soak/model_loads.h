@@ -1,5 +1,5 @@
-/* Forces of every type between bodies of a model, friction in its joints, user's variables and states, motions of its
- * joints. */
+/* Forces of every type between bodies of a model, friction in its joints, user-defined variables and states, motions
+   of its joints */
 #ifndef HHTDAE_SOAK_MODEL_LOADS_H
 #define HHTDAE_SOAK_MODEL_LOADS_H
 
@@ -108,7 +108,7 @@ public:
       b.add(TranslationalMotion{h.i, h.j, f, of, b.planar ? 0 : 2});
   }
 
-  /* zero at t = 0, of every kind of function */
+  /* zero at t = 0; functions of every kind */
   TimeFunction motion(double reach)
   {
     const double T = b.period, w = 2 * M_PI / T * r.uniform(0.3, 2);
@@ -135,13 +135,13 @@ private:
   Builder &b;
   Random  &r;
 
-  void pair(int &a, int &c) /* two bodies, of which the first may be the ground */
+  void pair(int &a, int &c) /* two bodies, the first of which may be the ground */
   {
     c = b.anyBody();
     a = r.chance(0.5) ? 0 : r.integer(0, b.bodies());
     if (a == c) a = 0;
   }
-  /* markers at least a third of the model's length apart */
+  /* markers whose distance is at least a third of the model's length */
   void ends(int a, int c, Marker &i, Marker &j)
   {
     const Vector3 x = b.on(c);
@@ -164,7 +164,7 @@ private:
     ends(a, c, i, j);
     if (!apart(i, j)) return;
     const double distance = (DataOf(b.scene).frame(i).x - DataOf(b.scene).frame(j).x).norm();
-    /* strained by what keeps forces near weights */
+    /* initial strain such that forces have the size of weights */
     const double strain = b.weight(c) / s.k * r.uniform(-0.5, 0.5);
     const bool   zero   = r.chance(0.1) && s.omega * b.period < 40;
     b.add(SpringDamper{i, j, s.k, s.c,
@@ -290,7 +290,7 @@ private:
     h.joint = Element{};
   }
 
-  /* a first-order actuator that pulls two bodies to a moving distance */
+  /* a first-order actuator that pulls two bodies to a varying distance */
   void actuator()
   {
     int    a, c;
@@ -314,7 +314,7 @@ private:
                           false, b.state(0.4)});
   }
 
-  /* quadratic drag, written with expressions; a force without reaction */
+  /* quadratic drag by expressions; a force without reaction */
   void wind()
   {
     const int    c = b.anyBody();
@@ -345,7 +345,7 @@ private:
         true, b.state(0.4)});
   }
 
-  /* a variable that other expressions use; now and then of accelerations or reactions */
+  /* a variable that other expressions use; sometimes of accelerations or reactions */
   void alias()
   {
     const int    c = b.anyBody();

@@ -1,4 +1,4 @@
-/* Gears, racks, couplers; rolling and skating; contacts; shakers; flexible bodies with what hangs on them. */
+/* Gears, racks, couplers; rolling and knife edges; contacts; shakers; flexible bodies with bodies attached to them */
 #ifndef HHTDAE_SOAK_MODEL_MACHINES_H
 #define HHTDAE_SOAK_MODEL_MACHINES_H
 
@@ -15,7 +15,7 @@ public:
   {
   }
 
-  /* two or three bodies on one base, their motions coupled */
+  /* two or three bodies on one base whose motions are coupled */
   int couple()
   {
     const int         base = b.bodies() && r.chance(0.4) ? b.anyRigid() : 0;
@@ -98,7 +98,7 @@ public:
     }
   }
 
-  /* a table that is moved along two or three axes and does not turn */
+  /* a table that is moved along two or three axes without rotation */
   int shaker(const std::function<TimeFunction()> &motion)
   {
     const Vector3 x     = 2 * b.length * b.direction();
@@ -159,7 +159,7 @@ private:
                        b.state()});
   }
 
-  /* axes of a plane whose normal points up; planar: a line along x */
+  /* axes of a plane with its normal upwards; planar: a line along x */
   Matrix3 level()
   {
     if (b.planar) return b.turn(0);
@@ -192,7 +192,7 @@ private:
     d.rotation         = A;
     d.angular_velocity = A.col(2) * r.sign() * std::sqrt(g / radius) * r.uniform(1.2, 3);
     d.velocity         = d.angular_velocity.cross(center - touch);
-    b.project          = true; /* what else hangs on it has to move along */
+    b.project          = true; /* other bodies attached to it must move along */
     const int wheel    = b.enter({b.scene.add("", d), center, A, m, radius, false, false});
     b.add(RollingDisc{b.at(wheel, center, A), ground, radius});
     return 1;
@@ -261,7 +261,7 @@ private:
     return 1;
   }
 
-  /* a ball above a face of a box that is fixed, or hangs in a bushing */
+  /* a ball above a face of a box that is fixed or held by a bushing */
   int onBox(double m, double size)
   {
     const Vector3 x = place(), half = size * Vector3(r.uniform(1, 3), r.uniform(1, 3), r.uniform(1, 3));

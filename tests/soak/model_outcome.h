@@ -1,4 +1,4 @@
-/* What became of one model: plain data, which come from its process through a pipe */
+/* Outcome of one model: plain data that the process of the model writes to shared memory */
 #ifndef HHTDAE_SOAK_MODEL_OUTCOME_H
 #define HHTDAE_SOAK_MODEL_OUTCOME_H
 
@@ -30,9 +30,9 @@ struct Outcome {
        reference_steps = 0, finer_steps = 0;
   double cpu = 0, total = 0, end = 0, length = 0, mass = 0, speed = 0, stiffest = 0, softest = 0;
   double error = -1, finer = -1, finest = -1, velocity = -1, finer_velocity = -1, reaction = -1, finer_reaction = -1,
-         doubt = -1, misfit = -1, slip = -1, energy = -1, used = -1; /* used: largest part of what is allowed */
-  double balance = -1, between = -1; /* of every body, relative to its loads: at ends of steps, between them */
-  double unsolved = -1;              /* residual of a body, relative to its loads */
+         doubt = -1, misfit = -1, slip = -1, energy = -1, used = -1; /* used: largest part of the allowed error */
+  double balance = -1, between = -1; /* imbalance of any body relative to its loads: at ends of steps, between them */
+  double unsolved = -1;              /* residual of any body relative to its loads */
   int  unjudged = 0, switched = 0, repeated = 0, resumed = 0;
   char message[600] = "", types[2000] = "";
 };

@@ -1,4 +1,4 @@
-/* The reduced parts that flexible bodies of the models are made of: made once, from box meshes in memory. */
+/* Reduced parts for the flexible bodies of the models: made once, from box meshes in memory */
 #ifndef HHTDAE_SOAK_MODEL_PARTS_H
 #define HHTDAE_SOAK_MODEL_PARTS_H
 
@@ -14,7 +14,7 @@ using ReducedPart = std::shared_ptr<const hhtdae::ModalBody>;
 
 struct PartPlan {
   hhtest::Box box;
-  bool        middle; /* a third attachment, in the middle of the top */
+  bool        middle; /* with a third attachment, in the middle of the top */
   int         modes;
 };
 
@@ -46,7 +46,7 @@ inline PetscErrorCode MakePart(const PartPlan &plan, const std::string &name, Re
   PetscFunctionReturn(0);
 }
 
-/* 6 to 20 modes with those of the attachments */
+/* with 6 to 20 modes, including those of the attachments */
 inline PetscErrorCode MakeParts(std::vector<ReducedPart> *parts)
 {
   const hhtdae::Material      steel{2.1e11, 0.3, 7850}, plastic{2e9, 0.38, 1100}, rubber{2e7, 0.45, 1200};

@@ -1,7 +1,5 @@
-/*
-  Every model in a process of its own, several at a time: a crash or an endless loop is counted, and the others go on.
-  Outcomes are in memory that the processes share, written as they come about.
-*/
+/* Every model runs in a process of its own, several at a time: a crash or an endless loop is counted, and the others
+   continue. The processes write outcomes to shared memory as soon as these are known */
 #ifndef HHTDAE_SOAK_MODEL_POOL_H
 #define HHTDAE_SOAK_MODEL_POOL_H
 
@@ -36,7 +34,7 @@ public:
   }
   Pool(const Pool &) = delete;
 
-  /* seconds of CPU time and ten times as many of the clock's are the deadline of one model */
+  /* seconds: CPU time allowed for one model; the limit of wall-clock time is ten times as large */
   PetscErrorCode run(long first, int jobs, double seconds, bool quiet, const Work &work, const Look &look)
   {
     std::map<pid_t, int> running;

@@ -1,4 +1,4 @@
-/* Random numbers that are the same on every machine: model k of seed s is always the same one. */
+/* Random numbers that are the same on every machine, so that model k of seed s is always the same */
 #ifndef HHTDAE_SOAK_MODEL_RANDOM_H
 #define HHTDAE_SOAK_MODEL_RANDOM_H
 
@@ -29,7 +29,7 @@ public:
   int    integer(int a, int b) { return a + (int)(next() % (std::uint64_t)(b - a + 1)); } /* both ends included */
   double sign() { return chance(0.5) ? 1 : -1; }
 
-  /* the place of a weight, chosen in proportion to the weights */
+  /* an index, chosen with a probability proportional to its weight */
   int choose(std::initializer_list<double> weights)
   {
     double sum = 0;
@@ -44,7 +44,7 @@ public:
     return k - 1;
   }
 
-  Vector3 vector() /* of length 1 at most */
+  Vector3 vector() /* of length 1 or less */
   {
     for (;;) {
       const double  x = uniform(-1, 1), y = uniform(-1, 1), z = uniform(-1, 1);

@@ -3,8 +3,8 @@
   formulation, other step and error control. Of the library it shares the scene's residual and Jacobian, and the
   consistent start.
 
-  A body whose Euler angles come near their singularity gets other axes here too: the run is cut at an output point
-  before that, the state is written in the new angles, and IDA starts again from there.
+  The axes of Euler angles that come near their singularity are changed here as well: the run is interrupted at an output
+  point before, the state is converted to the new angles, and IDA starts again from there.
 */
 #ifndef HHTDAE_SOAK_MODEL_REFERENCE_H
 #define HHTDAE_SOAK_MODEL_REFERENCE_H
@@ -18,14 +18,15 @@
 namespace soak
 {
 
-/* The scene from some state on; not a number where angles come near their singularity, so that IDA stops there */
+/* The scene from a given state on; its residual is NaN where Euler angles come near their singularity, so that IDA
+   stops there */
 struct Leg : hhtex::Problem {
   const hhtbench::SceneProblem &p;
   std::vector<double>           u0, v0, a0;
-  std::vector<PetscInt>         angles; /* first of the Euler angles of each body that has some */
+  std::vector<PetscInt>         angles; /* index of the first Euler angle of each body that has Euler angles */
   mutable bool                  singular = false;
 
-  static constexpr double least = 0.2; /* sine of theta */
+  static constexpr double least = 0.2; /* smallest sine of theta */
 
   Leg(const hhtbench::SceneProblem &problem) : p(problem)
   {
@@ -67,7 +68,7 @@ struct Leg : hhtex::Problem {
     p.jacobian(t, u, v, a, sv, sa, J);
   }
 
-  /* Other axes for all bodies, as their present motion chooses them, and the state (u0, v0, a0) in the new angles */
+  /* Changes the axes of all bodies according to their present motion, and converts the state (u0, v0, a0) to the new angles */
   void reframe()
   {
     Bodies &B = runtime().bodies;
@@ -110,12 +111,12 @@ struct ReferenceRun {
   std::unique_ptr<hhtbench::SceneProblem> problem;
   Trajectory                              result;
   int                                     legs = 0;
-  double                                  work = 0; /* so far */
+  double                                  work = 0; /* used so far */
 };
 
 constexpr int fine = 16; /* output points of IDA per sample */
 
-/* What IDA fails at one way it may do the other way: how it treats what is not in its error test, and the form */
+/* Variants of IDA, since one may succeed where another fails: the treatment of unknowns outside the error test, and the form */
 struct Way {
   wp::FirstOrder::Form form;
   double               looser;
@@ -129,10 +130,11 @@ inline Way    WayOf(int k)
   return all[k];
 }
 
-/* A residual of IDA, and what goes with it, take about three times as long as one of hhtdae of the same size */
+/* A residual of IDA, with the operations that belong to it, takes about three times as long as one of hhtdae of the
+   same size */
 inline double WorkOfIDA(double residuals, const Leg &leg) { return 3 * WorkOf(residuals, 2 * leg.n); }
 
-/* One leg, until IDA stops; the state at the last output point it got to becomes the start of the next */
+/* Runs one leg until IDA stops; the state at the last output point that was reached becomes the start of the next leg */
 inline PetscErrorCode RunLeg(ReferenceRun &r, Leg &leg, int &point, int way, double eps, double newton, double work,
                              std::string *failure)
 {

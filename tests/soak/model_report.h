@@ -1,4 +1,4 @@
-/* What 2,000 models have come to: counts, distributions, a line per failure; as text, CSV and a page. */
+/* Results of all models: counts, distributions, a line for each failure; as text, CSV and a page */
 #ifndef HHTDAE_SOAK_MODEL_REPORT_H
 #define HHTDAE_SOAK_MODEL_REPORT_H
 

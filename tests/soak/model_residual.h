@@ -1,17 +1,18 @@
 /*
-  What the end of a step leaves of the equations of motion of a body, as the scene's residual says, and how much of it a
-  corrector that has converged may leave.
+  Residual of the equations of motion of each body at the end of a step, according to the scene, and the residual that a
+  converged corrector may leave.
 
-  It may leave an error dq in every position, and with it dq gamma/(beta h) in velocities and dq/(beta h^2) in
-  accelerations. In the equations of a body these make at most the sum of |J_ij| dq_j over all coordinates j, with
-  J = F_u + sigma_v F_v + sigma_a F_a: inertia times the error of an acceleration, and stiffness and damping times those of
-  positions and velocities, far more than that where h omega is large. Force states and variables are off by what
-  their definitions make of dq.
+  The corrector may leave an error dq in every position, and therefore dq gamma/(beta h) in velocities and dq/(beta h^2) in
+  accelerations. These contribute to the equations of a body at most the sum of |J_ij| dq_j over all coordinates j, with
+  J = F_u + sigma_v F_v + sigma_a F_a: inertia times the error of an acceleration, and stiffness and damping times the
+  errors of positions and velocities, which are far larger where h omega is large. The errors of force states and variables
+  follow from dq by their definitions.
 
-  And it may miss accelerations that move a position by a tenth of the tolerance within the step, which is what the
-  integrator proves (src/integrator/proofs/verify.cpp): about an event, where steps are short, forces are known no better.
+  The corrector may also miss accelerations that move a position by less than a tenth of the tolerance within the step,
+  which is what the integrator proves (src/integrator/proofs/verify.cpp): around an event, where steps are short, forces are
+  no more accurate.
 
-  The same loads by channels have rounding of their own: stiffness and damping times some last digits of the unknowns.
+  Loads computed from channels have additional rounding errors: stiffness and damping times some last digits of the unknowns.
 */
 #ifndef HHTDAE_SOAK_MODEL_RESIDUAL_H
 #define HHTDAE_SOAK_MODEL_RESIDUAL_H
@@ -29,10 +30,10 @@ class BodyResiduals
 public:
   BodyResiduals(TS ts, double dq, double tolerance) : R_(*hhtdae::RunOf(ts)), dq_(dq), tolerance_(tolerance) {}
 
-  /* at the end of a step */
+  /* to be called at the end of a step */
   PetscErrorCode make(TS ts, PetscReal t)
   {
-    Vec       U, V, A, F, inertia, stiffness; /* M/(beta h^2), and the diagonal without it */
+    Vec       U, V, A, F, inertia, stiffness; /* inertia: M/(beta h^2); stiffness: the diagonal without it */
     Mat       J;
     PetscReal before;
 
@@ -65,12 +66,12 @@ public:
   const std::vector<hhtest::BodyResidual> &get() const { return of_; }
 
 private:
-  static constexpr double           beta = 0.4225, gamma = 0.8; /* of the default alpha, -0.3 */
+  static constexpr double           beta = 0.4225, gamma = 0.8; /* for the default alpha, -0.3 */
   hhtdae::Runtime                  &R_;
   double                            dq_, tolerance_;
-  std::vector<double>               error_; /* of each unknown */
-  std::vector<double>               missing_; /* force of each row that moves its coordinate by a tenth of the tolerance */
-  std::vector<double>               rounding_; /* of the loads of each row, by that of the unknowns */
+  std::vector<double>               error_; /* allowed error of each unknown */
+  std::vector<double>               missing_; /* force in each row that moves its coordinate by a tenth of the tolerance */
+  std::vector<double>               rounding_; /* rounding of the loads of each row that follows from the rounding of the unknowns */
   std::vector<hhtest::BodyResidual> of_;
 
   PetscErrorCode rounding(Mat J)
@@ -98,7 +99,7 @@ private:
     PetscCall(MatRestoreRow(J, i, &n, &column, &value));
     PetscFunctionReturn(0);
   }
-  /* definitions after the unknowns that they are made of */
+  /* errors of variables and force states come after those of the unknowns on which they depend */
   PetscErrorCode errors(TS ts, Vec U, Mat J, double dq)
   {
     const PetscScalar *u;
@@ -129,7 +130,7 @@ private:
     PetscCall(VecRestoreArrayRead(U, &u));
     PetscFunctionReturn(0);
   }
-  /* M a for a h^2/2 = a tenth of the tolerance */
+  /* M a with a h^2/2 = a tenth of the tolerance */
   PetscErrorCode missing(Vec U, Vec inertia)
   {
     const PetscScalar *u, *m;
@@ -144,7 +145,7 @@ private:
     PetscCall(VecRestoreArrayRead(U, &u));
     PetscFunctionReturn(0);
   }
-  /* of the rows of each body */
+  /* sums over the rows of each body */
   PetscErrorCode loads(Vec F, Mat J)
   {
     const PetscScalar *f;
@@ -153,7 +154,7 @@ private:
     of_.assign(R_.scene.bodies.size(), {});
     PetscCall(VecGetArrayRead(F, &f));
     for (std::size_t b = 0; b < of_.size(); b++) {
-      if (R_.number.body[b] < 0) continue; /* an attachment, whose loads are the flexible body's */
+      if (R_.number.body[b] < 0) continue; /* an attachment, whose loads act on the flexible body */
       const PetscInt           local  = R_.local_body[b];
       const hhtdae::LocalBody &body   = R_.bodies.body[(std::size_t)local];
       Vector3                  left[] = {Vector3::Zero(), Vector3::Zero()}, most[] = {Vector3::Zero(), Vector3::Zero()},
@@ -176,7 +177,7 @@ private:
     PetscCall(withoutInertia());
     PetscFunctionReturn(0);
   }
-  /* What has no inertia hands on what is left of the equations of its neighbours */
+  /* A massless body transmits what is left of the equations of its neighbours */
   PetscErrorCode withoutInertia()
   {
     double force = 0, moment = 0;

@@ -1,4 +1,4 @@
-/* One model run by one integrator: samples of its channels at common times, and what it cost. */
+/* A run of one model by one integrator: samples of its channels at common times, and its costs */
 #ifndef HHTDAE_SOAK_MODEL_RUN_H
 #define HHTDAE_SOAK_MODEL_RUN_H
 
@@ -13,27 +13,27 @@ namespace soak
 
 using hhtbench::ProcessorSeconds;
 
-constexpr int samples = 24; /* after the start */
+constexpr int samples = 24; /* not counting the start */
 
 struct Trajectory {
-  std::string                      failure;  /* empty: arrived */
+  std::string                      failure;  /* empty: the run reached the end */
   std::vector<std::vector<double>> x;        /* channels at the sample times, without the start */
   std::vector<long>                steps_at; /* steps so far, at the sample times */
   TSHHT3Statistics                 cost{};
   double                           cpu    = 0;
-  double                           misfit = 0, slip = -1; /* at ends of steps, see Misfit() */
+  double                           misfit = 0, slip = -1; /* largest values at ends of steps, see Misfit() */
   long                             steps = 0;
-  double      balance = -1, between = -1; /* largest imbalance of a body at ends of steps, at samples between them */
-  double      unsolved = -1;              /* largest residual of a body at ends of steps, beyond what it may be */
-  int         unjudged = 0;               /* bodies */
-  std::string out_of_balance, where_unsolved; /* where and when these were found */
-  bool        late = false; /* left at the limit of work */
+  double      balance = -1, between = -1; /* largest imbalance of a body at ends of steps, and at samples between them */
+  double      unsolved = -1;              /* largest residual of a body at ends of steps, beyond what is allowed */
+  int         unjudged = 0;               /* number of bodies */
+  std::string out_of_balance, where_unsolved; /* where and when these largest values occurred */
+  bool        late = false; /* stopped at the limit of work */
   bool        arrived() const { return failure.empty() && (int)x.size() == samples; }
 };
 
 inline double SampleTime(double end, int k) { return k == samples ? end : end * k / samples; }
 
-/* The first message of an error, in place of PETSc's printed trace */
+/* Error handler that keeps the first message of an error instead of printing PETSc's trace */
 class Quiet
 {
 public:
@@ -53,38 +53,39 @@ private:
   }
 };
 
-/* What runs may take is counted, so that a busy machine decides nothing: residuals, those of small systems for at least what goes with them */
-constexpr double work_per_second = 1e7; /* about, of an idle core */
+/* Limits of runs are counted in work instead of time, so that results do not depend on the load of the machine:
+   residuals, where those of small systems count at least as much as the operations that accompany them */
+constexpr double work_per_second = 1e7; /* approximately, for an idle core */
 inline double    WorkOf(double residuals, PetscInt unknowns) { return residuals * ((double)unknowns + 50); }
 
 /* ---- hhtdae ---- */
 
 struct Settings {
-  double            eps       = 0; /* 0: as it comes */
+  double            eps       = 0; /* 0: default */
   bool              paper     = false;
-  double            radius    = -1;    /* negative: as it comes */
-  bool              options   = false; /* from the command line */
-  double            work      = 1e300; /* that it may take, see WorkOf() */
-  double            first     = 0;     /* first step, from which steps grow by a fifth at most; 0: as they come */
-  double            corrector = 0;     /* 0: as it comes */
+  double            radius    = -1;    /* negative: default */
+  bool              options   = false; /* use options from the command line */
+  double            work      = 1e300; /* limit of work, see WorkOf() */
+  double            first     = 0;     /* length of the first step, after which steps grow by at most a fifth; 0: default */
+  double            corrector = 0;     /* 0: default */
   bool              laws      = false; /* judge the balance of every body */
-  double            tolerance = 0;     /* of the laws: that of the run, and what the corrector may leave of a position, */
-  double            slack     = 0;     /* model_residual.h */
-  std::string       save, resume;      /* checkpoint to write, to go on from */
-  long              save_at = 0;       /* step */
-  const Trajectory *until   = nullptr; /* of a run that goes on: the samples before */
+  double            tolerance = 0;     /* for the laws: the tolerance of the run, and the error of a position that the corrector may leave, */
+  double            slack     = 0;     /* see model_residual.h */
+  std::string       save, resume;      /* checkpoint to write, checkpoint to resume from */
+  long              save_at = 0;       /* after this step */
+  const Trajectory *until   = nullptr; /* for a resumed run: the samples before the checkpoint */
 };
 
 struct Watcher {
   Scene               &scene;
   double               end;
   const Settings      &settings;
-  std::size_t          observed; /* channels of the model; those of the laws come after */
+  std::size_t          observed; /* number of channels of the model; those of the laws follow */
   hhtest::NewtonEuler *laws;
   Trajectory          &result;
 };
 
-/* The largest so far, and of its place a note */
+/* Keeps the largest value so far, and a note where it occurred */
 inline void Keep(const hhtest::Imbalance &now, double t, double *most, std::string *note)
 {
   if (!(now.largest <= *most) && note) *note = hhtbench::Text("%s at t = %g by %.1e", now.where.c_str(), t, now.largest);
@@ -103,8 +104,8 @@ inline PetscErrorCode JudgeLaws(Watcher &w, TS ts, double t)
   PetscFunctionReturn(0);
 }
 
-/* How far the state is off the constraints: of positions, in lengths and sines; of velocities, as they are, and times
-   the step, as every step solves them anew */
+/* Violation of the constraints by the state: of positions, in lengths and sines; of velocities, as they are, and times
+   the step, because every step solves them anew */
 inline PetscErrorCode Misfit(TS ts, PetscReal t, Trajectory *result)
 {
   Vec                U, V, A, F;
@@ -157,7 +158,7 @@ inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec X, void *c
   }
   if (w.laws && (w.result.x.size() > before || step < 20)) PetscCall(JudgeLaws(w, ts, t));
   if (w.result.x.size() > before) PetscCall(Misfit(ts, t, &w.result));
-  if (step == w.settings.save_at && !w.settings.save.empty()) /* after the samples of the step, whose solver the file has, as the run that goes on does not take them */
+  if (step == w.settings.save_at && !w.settings.save.empty()) /* after the samples of the step, which the resumed run does not repeat: the file has their solver */
     PetscCall(TSHHT3CheckpointSave(ts, w.settings.save.c_str()));
   if (step % 16 == 0) {
     PetscInt         unknowns;
@@ -220,7 +221,7 @@ inline PetscErrorCode SolveBy(const Model &m, const Settings &s, Trajectory *res
   PetscFunctionReturn(0);
 }
 
-/* The scene is made anew for every run: a run leaves axes and memories behind */
+/* The scene is made anew for every run, because a run changes axes and counted angles */
 inline Trajectory RunHHT(const Model &m, const Settings &s)
 {
   Trajectory result;

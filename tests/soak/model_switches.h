@@ -1,8 +1,8 @@
 /*
-  Stiff elements that let go or take hold: springs, dampers, brakes, bushings whose stiffness or damping is 1e2 to 1e12
-  times what the mass has at the time scale of the model, and contacts as hard. What holds them is a gate between 1 and
-  0, of time, at once or within a span, or of the state: the way of a body that is pushed past a latch. The time of the
-  event is known: the run is cut into two motions that have nothing of the stiffness in common.
+  Stiff elements that are released or engaged: springs, dampers, brakes and bushings whose stiffness or damping is 1e2 to
+  1e12 times that formed from the mass and the time scale of the model, and hard contacts. A gate between 1 and 0 multiplies
+  their force; it is a function of time, a jump or a transition, or of the state: the displacement of a body that is pushed
+  past a latch. The time of the event is known and divides the run into a motion with and one without the stiff element.
 */
 #ifndef HHTDAE_SOAK_MODEL_SWITCHES_H
 #define HHTDAE_SOAK_MODEL_SWITCHES_H
@@ -12,11 +12,11 @@
 namespace soak
 {
 
-/* 1 until s = at - width, 0 from at + width on; between by a quintic; width 0: at once */
+/* 1 for s < at - width, 0 for s > at + width, between them a quintic; width 0: a jump */
 struct Gate {
   Measure of;
   double  at = 0, width = 0;
-  bool    holds_later = false; /* the other way round */
+  bool    holds_later = false; /* from 0 to 1 instead */
 
   Real operator()(const Real &s) const
   {
@@ -31,14 +31,14 @@ struct Gate {
 };
 
 struct Impact {
-  double time = 1e300, speed = 0, frequency = 0; /* the first, the largest and the highest one */
+  double time = 1e300, speed = 0, frequency = 0; /* the first time, the largest speed and the highest frequency */
 };
 
 class Switches
 {
 public:
   Switches(Builder &builder, double end) : b(builder), r(builder.random), end_(end) {}
-  std::vector<Marker> seen; /* of the bodies that are let go or held */
+  std::vector<Marker> seen; /* on the bodies that are released or held */
   Impact              impact;
 
   void any()
@@ -64,12 +64,12 @@ private:
   Random  &r;
   double   end_;
 
-  /* Forces on a unit of mass, of the velocity; k: rate of decay times the period, v: velocity of the model */
+  /* Forces per unit of mass as functions of velocity; k: decay rate times the period, v: velocity of the model */
   struct Damper {
     double k, v;
     Real   operator()(const Real &speed) const { return -k * speed; }
   };
-  struct Brake { /* as stiff as the damper about rest; its force stays below 1e6 m v / T */
+  struct Brake { /* as steep as the damper at zero velocity; its force stays below 1e6 m v / T */
     double k, v, period;
     Real   operator()(const Real &speed) const
     {
@@ -84,7 +84,7 @@ private:
     return r.logarithmic(1e2, most);
   }
 
-  /* where things stand: a rigid body that is there, or the ground */
+  /* base for elements: a rigid body of the model, or the ground */
   int base() { return b.bodies() && r.chance(0.4) ? firm(b.anyRigid()) : 0; }
   int firm(int body) const { return b.placed[(std::size_t)body].flexible ? 0 : body; }
 
@@ -112,7 +112,7 @@ private:
     return g;
   }
 
-  /* A mass pushed along a guide across the upward direction from rest: s = a t^2/2 */
+  /* A mass pushed from rest along a guide across the upward direction: s = a t^2/2 */
   void latch(Gate &g, double when)
   {
     const Vector3 up    = b.gravity.norm() > 0 ? Vector3(-b.gravity.normalized()) : b.up;
@@ -167,7 +167,7 @@ private:
     return h;
   }
 
-  /* a body on a guide that a damper or a brake keeps */
+  /* a body on a guide, held by a damper or a brake */
   template <class Make> void onGuide(const char *name, const Gate &g, const Make &make)
   {
     const Held   h   = guided(true);
@@ -178,7 +178,7 @@ private:
     b.used[name]++;
   }
 
-  /* a body on a guide that a damped spring holds until it lets go */
+  /* a body on a guide, held by a damped spring until its release */
   void spring()
   {
     const Held   h = guided(false);
@@ -189,7 +189,7 @@ private:
     b.used["switched spring"]++;
   }
 
-  /* a pendulum on a pin, held by a damper or a brake, or by a torsional spring */
+  /* a pendulum on a pin, held by a damper, a brake or a torsional spring */
   void turning()
   {
     const int     on = base(), kind = r.choose({1, 1, 1});
@@ -223,8 +223,8 @@ private:
                        : "switched torsional spring"]++;
   }
 
-  /* A free body in a bushing: three springs and dampers, three of rotation for small angles, which the ends of unit
-   * axes show */
+  /* A free body in a bushing: three springs and dampers, and three rotational ones for small angles, which are
+     measured by the end points of unit axes */
   void bushing()
   {
     const int     on    = base();
@@ -260,8 +260,8 @@ private:
     b.used["switched bushing"]++;
   }
 
-  /* A mass m at rest meets a contact after a way `gap` under the acceleration a. Its frequency is its speed v over the depth at which the energy
-     of the contact is m v^2/2. */
+  /* A mass m at rest reaches a contact after a distance `gap` with the acceleration a. The frequency of the contact is
+     the speed v over the depth at which the contact's energy is m v^2/2 */
   void meets(double m, double gap, double a, const ContactLaw &law)
   {
     const double v     = std::sqrt(2 * a * gap),

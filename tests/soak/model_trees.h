@@ -1,5 +1,5 @@
-/* Trees of bodies and closed loops: poses first, then joints with markers at one place on both bodies, so that loops
- * close. */
+/* Trees of bodies and closed loops: poses are chosen first, then joints with markers at the same place on both bodies,
+   so that loops close */
 #ifndef HHTDAE_SOAK_MODEL_TREES_H
 #define HHTDAE_SOAK_MODEL_TREES_H
 
@@ -13,7 +13,7 @@ class Trees
 public:
   explicit Trees(Builder &builder) : b(builder), r(builder.random) {}
 
-  /* a child on parent, with any joint */
+  /* a child of parent with any type of joint */
   int branch(int parent)
   {
     const Vector3 x = b.placed[parent].at + reach(parent);
@@ -38,8 +38,8 @@ public:
     }
   }
 
-  /* Joints about one normal: four-bars, five-bars, slider-cranks. In space, revolute joints all around say some things
-   * twice. */
+  /* Loops of joints about one normal: four-bars, five-bars, slider-cranks. In space, loops of revolute joints only are
+     redundantly constrained */
   int planeLoop()
   {
     const int            n      = r.choose({5, 2, 1}) + 3;
@@ -60,7 +60,7 @@ public:
     return n;
   }
 
-  /* Joints with axes anywhere whose freedoms sum up to seven or more */
+  /* Loops of joints with arbitrary axes whose degrees of freedom sum up to seven or more */
   int spaceLoop()
   {
     const int            n      = r.integer(2, 5);
@@ -70,10 +70,10 @@ public:
       corner.push_back(corner.back() + b.length * r.uniform(0.7, 1.3) * r.direction());
       link.push_back(b.addBody((corner[k] + corner[k + 1]) / 2));
     }
-    int       freedoms = 3; /* of the last joint, spherical */
+    int       freedoms = 3; /* of the last joint, which is spherical */
     const int missing  = 7 - freedoms;
     for (int k = 0; k < n; k++) {
-      const int rest = n - 1 - k, least = missing - (freedoms - 3) - 3 * rest; /* the others may be spherical */
+      const int rest = n - 1 - k, least = missing - (freedoms - 3) - 3 * rest; /* the remaining joints may be spherical */
       const int f = std::max(least, r.integer(1, 3));
       loopJoint(f, link[k], link[k + 1], corner[k]);
       freedoms += f;
@@ -83,7 +83,7 @@ public:
     return n;
   }
 
-  /* A platform on the ground by links of constant length, at most five */
+  /* A platform connected to the ground by at most five links of constant length */
   int platform()
   {
     const int top = b.addBody(2 * b.length * r.direction());
@@ -97,8 +97,7 @@ public:
     return 1;
   }
 
-  /* Angular about z_j, or linear along the axis that joints leave free; adds what an element needs to be driven or
-   * rubbed */
+  /* Adds what an element needs to drive the joint or to act in it: angular about z_j, or linear along the joint's free axis */
   Element hold(Held::Kind kind, int parent, int child, const Vector3 &x, const Matrix3 &R, bool free)
   {
     const Marker i = b.at(child, x, R), j = b.at(parent, x, R);
@@ -248,7 +247,7 @@ private:
         {b.add(PointDistance{i, j}), i, j, Held::Other, false, b.placed[child].mass, b.placed[child].size});
   }
 
-  /* An arc or a ring through x, in the axes of a marker of the parent */
+  /* An arc or a closed curve through x, in the axes of a marker of the parent */
   void curve(int parent, int child, const Vector3 &x, const Matrix3 &R)
   {
     const double         radius = b.length * r.uniform(0.6, 2), rise = b.planar ? 0 : radius * r.uniform(0, 0.4);
@@ -285,7 +284,7 @@ private:
     return child;
   }
 
-  /* what a joint leaves free to slide is mostly held by a spring */
+  /* a sliding degree of freedom is usually held by a spring */
   void tether(int parent, int child, const Vector3 &x)
   {
     if (r.chance(0.15)) return;
@@ -302,12 +301,12 @@ private:
       hold(Held::Revolute, 0, last, x, R, false);
     else if (kind == 1)
       slide(last, x, R);
-    else { /* in space: without saying things twice */
+    else { /* in space: without redundant constraints */
       const Marker i = b.at(last, x, R), j = b.at(0, x, R);
       b.add(InLine{i, j});
     }
   }
-  /* the last link's end in a straight guide: by a slider, or, planar, by a curve that is almost straight */
+  /* guides the last link's end along a line: by a slider, or in the plane by an almost straight curve */
   void slide(int last, const Vector3 &x, const Matrix3 &R)
   {
     const double  angle  = r.uniform(-0.6, 0.6);

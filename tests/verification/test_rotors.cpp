@@ -85,7 +85,8 @@ double errorOf(Gyroscope &exact, double end, double h, Rotations rotations)
 }
 
 /*
-  Displacement z = x + iy of the shaft's end and slope s, both complex; the disc's centre of mass is at the distance e (campbell.cpp computes the frequencies):
+  Displacement z = x + iy of the shaft's end and slope s, both complex; the disc's centre of mass is at the distance e
+  (campbell.cpp computes the frequencies):
 
     m (z'' - e speed^2 exp(i speed t)) + 12 EI/L^3 z - 6 EI/L^2 s = 0,      It s'' - i Ip speed s' - 6 EI/L^2 z + 4 EI/L s = 0
 */

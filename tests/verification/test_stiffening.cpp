@@ -73,10 +73,11 @@ TEST(Stiffening, Column)
 }
 
 /*
-  A thin strip under a force P in its plane and a small lateral force q. When the strip bends laterally, P has a moment about its axis: with s from
-  the tip, GJ phi'' + P s^2 (q + P phi)/EI = 0 and EI v'' = s (q + P phi). Hence q + P phi = q f(s)/f(L) with GJ EI f'' + P^2 s^2 f = 0, f(0) = 1, f'(0) = 0;
-  the strip buckles where f(L) = 0, at P = 4.013 sqrt(EI GJ)/L^2 (Timoshenko, Gere, Theory of Elastic Stability, section 6.3). Restrained warping at the
-  ends and the bending in the plane increase this load by about 4 %, and by 2.6 % for a strip of half the depth.
+  A thin strip under a force P in its plane and a small lateral force q. When the strip bends laterally, P has a moment
+  about its axis: with s from the tip, GJ phi'' + P s^2 (q + P phi)/EI = 0 and EI v'' = s (q + P phi). Hence
+  q + P phi = q f(s)/f(L) with GJ EI f'' + P^2 s^2 f = 0, f(0) = 1, f'(0) = 0; the strip buckles where f(L) = 0, at
+  P = 4.013 sqrt(EI GJ)/L^2 (Timoshenko, Gere, Theory of Elastic Stability, section 6.3). Restrained warping at the ends and
+  the bending in the plane increase this load by about 4 %, and by 2.6 % for a strip of half the depth.
 */
 TEST(Stiffening, LateralBuckling)
 {
