@@ -75,7 +75,7 @@ std::vector<Input> Good()
   return good;
 }
 
-/* ---- other contents under right checksums ---- */
+/* ---- other contents with right checksums ---- */
 
 class Rewriter
 {
@@ -94,7 +94,7 @@ public:
     if (H5Tequal(type, H5T_STD_I64LE) > 0) dataset<int64_t>(path, &set);
     if (H5Tequal(type, H5T_STD_U8LE) > 0) dataset<uint8_t>(path, &set);
   }
-  /* The sum over all, as the reader takes it */
+  /* Writes the checksum that the reader computes */
   void seal()
   {
     Head head;
@@ -118,7 +118,7 @@ public:
     rewrite(file_, "checksum", H5T_NATIVE_UINT64, &sum);
   }
 
-  /* Numbers that no body has */
+  /* Numbers that no valid body has */
   void absurd()
   {
     static const std::vector<std::pair<std::string, double>> values = {
@@ -197,7 +197,7 @@ private:
     if (r_.chance(0.9)) make(path, dims, data);
   }
 
-  /* A dataset of other dimensions, some of them zero and some beyond all files, or of other numbers */
+  /* A dataset with other dimensions, some of them zero and some beyond any file size, or with another type of numbers */
   template <class T> void make(const std::string &path, Dims dims, std::vector<T> data)
   {
     if (r_.chance(0.3)) dims.push_back(1 + r_.below(3));
@@ -237,7 +237,7 @@ Input Damage(const std::vector<Input> &good, Random &r)
   Quiet           quiet;
   hhtest::Scratch file("rewritten.h5");
   if (r.chance(0.3)) {
-    input        = good.front(); /* which has modes */
+    input        = good.front(); /* this one has modes */
     input.refuse = true;
   }
   file.write(input.files[0].text);

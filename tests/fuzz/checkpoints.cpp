@@ -24,7 +24,7 @@ bool Finite(const Simulation &run)
   return std::isfinite(run.t());
 }
 
-/* A grid of point masses on springs, which conjugate gradients solve with a coarse level: -pc_type hhtconstraint */
+/* A grid of point masses on springs, solved by conjugate gradients with a coarse level: -pc_type hhtconstraint */
 struct Net : Problem {
   static constexpr PetscInt nx = 4, ny = 3, nz = 2;
   struct Spring {
@@ -85,8 +85,8 @@ void Prepare(const Net &net, TS ts)
 template <class P> std::string Settings() { return settings; }
 template <> std::string        Settings<Net>() { return std::string(settings) + "-ksp_type cg -pc_type hhtconstraint -pc_hhtconstraint_aggregate 8 "; }
 
-/* A refusal names the file. What is taken has a finite state, which it still has some steps later, or the run ends in an
-   error of its own. */
+/* A refusal must name the file. An accepted file must have a finite state, which is still finite some steps later,
+   unless the run ends with an error */
 template <class P> void Resume(const std::string &folder, Answer *a)
 {
   const P    problem;

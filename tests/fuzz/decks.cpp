@@ -1,4 +1,4 @@
-/* Input decks of CalculiX with the matrices that it stores; and decks that ask for much with few lines. */
+/* Input decks of CalculiX with the matrices that it stores; and short decks that request much memory or time */
 #include "fe_models.h"
 #include "hhtdae/flexible.h"
 #include <algorithm>
@@ -42,7 +42,7 @@ std::string Matrix(double diagonal)
     for (int i = std::max(1, j - 3); i <= j; i++) {
       std::snprintf(line, sizeof line, "\x01%d \x01%d \x01%20.13e\n", i, j, i == j ? diagonal : -0.1 * (double)(j - i));
       std::string spaced = line;
-      const auto  at     = spaced.rfind(mark); /* the sign belongs before the digits */
+      const auto  at     = spaced.rfind(mark); /* the mark must be directly before the digits */
       const auto  digits = spaced.find_first_not_of(' ', at + 1);
       spaced.erase(at, 1);
       spaced.insert(digits - 1, 1, mark);
@@ -91,7 +91,7 @@ Input Demanding(const std::vector<Input> &good, Random &r)
     more = begin + "huge, GENERATE\n";
     for (std::size_t k = 1 + r.below(200); k > 0; k--) more += Range(r);
     break;
-  case 1: { /* each is several times the one before */
+  case 1: { /* each set is several times the previous one */
     more = begin + "s0\n" + Label(r) + ", 1\n";
     if (r.chance(0.5)) more = begin + "s0, GENERATE\n" + Range(r);
     const std::size_t deep = 5 + r.below(60), times = 2 + r.below(6);
@@ -101,7 +101,7 @@ Input Demanding(const std::vector<Input> &good, Random &r)
     }
     break;
   }
-  case 2: { /* a fan of files */
+  case 2: { /* a tree of included files */
     const std::size_t files = 2 + r.below(12), times = 2 + r.below(12);
     for (std::size_t f = 0; f < files; f++) {
       std::string text = "*NSET, NSET=f" + std::to_string(f) + "\n11\n";
@@ -112,11 +112,11 @@ Input Demanding(const std::vector<Input> &good, Random &r)
     more = "*INCLUDE, INPUT=f0.inc\n";
     break;
   }
-  case 3: /* a keyword that does not end */
+  case 3: /* a keyword without an end */
     more = begin + "long,\n";
     for (std::size_t k = r.below(60000); k > 0; k--) more += r.chance(0.9) ? ",\n" : "x=1,\n";
     break;
-  case 4: { /* things that are no files */
+  case 4: { /* names that are not files */
     static const std::vector<std::string> names = {"/dev/zero", "/dev/stdin", ".", "/", "job.inp", "", "/dev/tty", "nowhere"};
     more = "*INCLUDE, INPUT=" + r.of(names) + "\n";
     break;

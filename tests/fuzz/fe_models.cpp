@@ -1,4 +1,4 @@
-/* Whether a finite-element model that was read can be one. */
+/* Whether a finite-element model that was read is possible */
 #include "fe_models.h"
 #include "hhtdae/flexible.h"
 #include <algorithm>

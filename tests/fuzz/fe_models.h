@@ -1,4 +1,4 @@
-/* What the readers of finite-element models share: whether a model that was taken can be one. */
+/* Shared by the readers of finite-element models: whether an accepted model is possible */
 #ifndef HHTDAE_TESTS_FUZZ_FE_MODELS_H
 #define HHTDAE_TESTS_FUZZ_FE_MODELS_H
 

@@ -33,66 +33,67 @@ private:
 struct File {
   std::string name, text;
   bool        binary = false;
-  std::string bytes() const; /* as they are written: of a text without marks */
+  std::string bytes() const; /* the bytes written to the file: the text without marks */
 };
 
-/* refuse: the reader must not take it, as it has no meaning */
+/* refuse: the reader must refuse the input, because it has no meaning */
 struct Input {
   std::vector<File> files;
   bool              refuse = false;
-  File             &file(const std::string &end); /* the one whose name ends so */
+  File             &file(const std::string &end); /* the file whose name ends with `end` */
 };
 
-/* What a reader did with an input, as its process tells it */
+/* The reader's reaction to an input, as reported by its process */
 struct Answer {
   PetscErrorCode code = 0;
-  std::string    message;  /* of the error */
-  std::string    nonsense; /* what it has taken, though nothing can mean it; "" if that is well */
-  bool           named = true; /* the message has to name a file of the input */
+  std::string    message;  /* error message */
+  std::string    nonsense; /* accepted content that no valid model can contain; "" if there is none */
+  bool           named = true; /* the message must name a file of the input */
 };
 
 struct Reader {
   std::string                                              name;
-  std::function<std::vector<Input>()>                      good; /* inputs that have to be taken */
+  std::function<std::vector<Input>()>                      good; /* valid inputs, which must be accepted */
   std::function<Input(const std::vector<Input> &, Random &)> damage;
   std::function<void(const std::string &folder, Answer *)> read;
 };
 
 std::vector<Reader> &Readers();
 
-/* A reader joins the list before main() begins */
+/* Adds a reader to the list before main() begins */
 struct Register {
   explicit Register(Reader reader) { Readers().push_back(std::move(reader)); }
 };
 
 /* ---- damage: mutate.cpp ---- */
 
-/* Numbers that are read stand behind this sign in texts of good inputs; it is taken away before the files are written. */
+/* In the texts of valid inputs this sign precedes every number that the reader reads; it is removed before the files
+   are written */
 constexpr char mark = '\x01';
-/* All words of a text get the sign */
+/* Marks all words of a text */
 std::string Marked(const std::string &text);
 
-/* One to four changes: bytes, words, lines, numbers */
+/* Applies one to four changes of bytes, words, lines or numbers */
 void DamageText(std::string *text, Random &random);
 void DamageBytes(std::string *bytes, Random &random);
-/* What is no number in place of one that is read; false: there is none */
+/* Replaces a number that is read by text that is not a number; false: there is none */
 bool Poison(std::string *text, Random &random);
-/* One file of an input, or a number that is read, damaged as text; the usual way */
+/* The usual damage: one file of an input is changed as text, or one number that is read is replaced */
 Input DamageFiles(const std::vector<Input> &good, Random &random);
 
-/* ---- a process of its own: process.cpp ---- */
+/* ---- separate processes: process.cpp ---- */
 
 struct Outcome {
   enum Kind { Taken, Refused, Crashed, Hung, Memory, Nonsense } kind = Taken;
   std::string text;
-  double      cpu = 0, megabytes = 0; /* seconds; beyond what the process began with */
+  double      cpu = 0, megabytes = 0; /* seconds; memory in addition to that at the start of the process */
 };
 const char *NameOf(Outcome::Kind kind);
 
-/* Writes the input's files to the folder and has them read */
+/* Writes the input's files to the folder and calls the reader */
 Outcome Try(const Reader &reader, const Input &input, const std::string &folder);
 
-/* While it lives, PETSc's errors are returned, and the first message is kept */
+/* During its lifetime PETSc's errors are returned, and the first message is stored */
 class Errors
 {
 public:

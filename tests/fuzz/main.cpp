@@ -33,7 +33,7 @@ namespace
 
 constexpr int kinds = Outcome::Nonsense + 1, most_jobs = 256;
 
-/* Counts, and the inputs that took most time and memory */
+/* Counts, and the inputs that needed most time and memory */
 struct Tally {
   long     of[kinds];
   double   cpu, megabytes;
@@ -43,7 +43,7 @@ struct Tally {
 struct Plan {
   PetscInt                        count = 100000, seed = 1, jobs = 1, only = -1;
   std::string                     reader, output = "build/fuzz";
-  std::vector<std::vector<Input>> good; /* of each reader */
+  std::vector<std::vector<Input>> good; /* valid inputs of each reader */
 };
 
 bool IsFault(Outcome::Kind kind) { return kind != Outcome::Taken && kind != Outcome::Refused; }
@@ -77,7 +77,7 @@ void Most(double *most, PetscInt *input, double value, PetscInt number)
   *input = number;
 }
 
-/* The numbers that are this job's */
+/* Processes the input numbers of this job */
 void Work(const Plan &plan, int job, const std::string &folder, Tally *tally)
 {
   for (PetscInt k = job; k < plan.count; k += plan.jobs) {
@@ -99,7 +99,7 @@ void Work(const Plan &plan, int job, const std::string &folder, Tally *tally)
   }
 }
 
-/* Good inputs have to be taken, or their damage says nothing. */
+/* Valid inputs must be accepted; otherwise damaged ones show nothing */
 int TryGood(const Plan &plan, const std::string &folder)
 {
   int faults = 0;
@@ -218,7 +218,7 @@ PetscErrorCode Run(long *faults)
   Plan plan;
   char scratch[PETSC_MAX_PATH_LEN];
   PetscFunctionBegin;
-  /* the same numbers for the same inputs, in whatever order the sources were linked */
+  /* sorted, so that numbers stand for the same inputs in whatever order the sources were linked */
   std::sort(Readers().begin(), Readers().end(), [](const Reader &a, const Reader &b) { return a.name < b.name; });
   PetscCall(ReadOptions(&plan));
   PetscCall(PetscGetTmp(PETSC_COMM_SELF, scratch, sizeof scratch));

@@ -19,7 +19,7 @@ void ReadMesh(const std::string &folder, Answer *a)
   if (!a->code) a->nonsense = Nonsense(model);
 }
 
-/* Every number that is read is marked: of the heads of nodes and elements in format 4.1 only the first is. */
+/* Marks every number that is read: in format 4.1 only the first number of the heads of nodes and elements is read */
 std::string MarkedMesh(const std::string &text)
 {
   std::istringstream in(text);
@@ -59,7 +59,7 @@ std::vector<Input> GoodText()
   return good;
 }
 
-/* Numbers of a text as bytes */
+/* Converts the numbers of a text to bytes */
 class Converter
 {
 public:

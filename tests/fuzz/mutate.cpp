@@ -62,7 +62,7 @@ std::vector<Span> Lines(const std::string &text)
 
 std::string Cut(const std::string &text, Span s) { return text.substr(s.begin, s.size()); }
 
-/* The later one first, so that places stay right */
+/* The later span is replaced first, so that positions stay valid */
 void Swap(std::string *text, Span a, Span b)
 {
   if (a.begin > b.begin) std::swap(a, b);
@@ -117,19 +117,19 @@ void OneChange(std::string *text, Random &r)
   case 10:
     text->insert(word.end, std::string(1 + r.below(3), r.of(std::vector<char>{'0', '9', '.', 'e', 'D', '-', 'x', ',', '"', '\0', '*', '\n'})));
     break;
-  case 11: { /* a line very often */
+  case 11: { /* a line repeated many times */
     std::string       many;
     const std::string one = Cut(*text, line);
     for (std::size_t k = r.below(2000); k > 0; k--) many += one;
     text->insert(line.end, many);
     break;
   }
-  case 12: { /* from one place to another */
+  case 12: { /* moved from one place to another */
     const Span from = r.of(lines);
     text->insert(line.end, text->substr(from.begin, from.size() * (1 + r.below(4))));
     break;
   }
-  case 13: { /* another count or label nearby */
+  case 13: { /* a count or label changed to a nearby value */
     const std::string s = WithoutMarks(Cut(*text, word));
     if (s.size() < 9 && s.find_first_not_of("0123456789") == std::string::npos)
       text->replace(word.begin, word.size(), std::to_string(std::stol("0" + s) + (long)r.below(5) - 2));
@@ -138,7 +138,7 @@ void OneChange(std::string *text, Random &r)
   }
 }
 
-/* A word of a binary file, in either order of bytes */
+/* An extreme value as a word of a binary file, in either byte order */
 std::string Extreme(Random &r)
 {
   static const std::vector<std::uint64_t> words = {0, 1, ~0ull, 0x7fffffff, 0x80000000, 0x7fffffffffffffff, 0x8000000000000000,
@@ -196,7 +196,7 @@ void DamageBytes(std::string *bytes, Random &r)
     case 4:
       bytes->insert(at, bytes->substr(r.below(bytes->size()), 1 + r.below(64)));
       break;
-    default: { /* mostly in the beginning, where sizes stand, and where words do */
+    default: { /* mostly near the beginning, where sizes are, and at words */
       const std::string word  = Extreme(r);
       const std::size_t place = (r.chance(0.4) ? r.below(std::min<std::size_t>(64, bytes->size())) : at) & ~(std::size_t)3;
       bytes->replace(place, std::min(word.size(), bytes->size() - place), word);

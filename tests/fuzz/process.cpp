@@ -1,4 +1,4 @@
-/* An input is read in a process of its own, forked from one in which PETSc runs already: that costs a millisecond. */
+/* Reads an input in a process of its own, forked from one in which PETSc is already initialized, which takes a millisecond */
 #include "fuzz.h"
 #include <csignal>
 #include <cstdio>
@@ -15,19 +15,19 @@ namespace hhtfuzz
 namespace
 {
 
-/* Bounds. Readers hold buffers of a few megabytes whatever the file's size; PETSc and HDF5 load and set up things of their own
-   at first use. By the clock, since a process that waits for something uses no processor. */
+/* Limits. Readers have buffers of a few megabytes for any file size; PETSc and HDF5 load and set up data at their
+   first use. The limit of wall-clock time is needed because a waiting process uses no processor time */
 constexpr rlim_t cpu_seconds   = 5;
 constexpr int    clock_seconds = 120;
 constexpr rlim_t fixed_bytes = (rlim_t)96 << 20, bytes_for_one = 1000;
 
 #if defined(__SANITIZE_ADDRESS__)
-constexpr bool sanitized = true; /* it reserves terabytes of addresses, and reports crashes itself */
+constexpr bool sanitized = true; /* the sanitizer reserves terabytes of addresses and reports crashes itself */
 #else
 constexpr bool sanitized = false;
 #endif
 
-/* Addresses in use, and memory */
+/* Size of the address space and of the memory in use */
 void InUse(rlim_t *addresses, double *megabytes)
 {
   long          pages = 0, resident = 0;
@@ -51,7 +51,7 @@ void Bound(std::size_t bytes)
   alarm(clock_seconds);
 }
 
-/* What the reader says goes to a file beside the input. */
+/* Redirects the reader's output to a file beside the input */
 void Redirect(const std::string &file)
 {
   const int out = open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);

@@ -1,4 +1,4 @@
-/* Matrices of bricks held by multipliers, solved with "hhtconstraint": fixtures of its tests */
+/* Fixtures for tests of "hhtconstraint": matrices of bricks held by multipliers */
 #ifndef TESTS_CONSTRAINT_FIXTURE_H
 #define TESTS_CONSTRAINT_FIXTURE_H
 
@@ -13,12 +13,12 @@
 #include <vector>
 
 #define OK(call)       ASSERT_EQ((call), 0)
-#define OK_VALUE(call) EXPECT_EQ((call), 0) /* in functions that return a value */
+#define OK_VALUE(call) EXPECT_EQ((call), 0) /* for functions that return a value */
 
 namespace
 {
 
-/* Bricks held by multipliers at one face, unknowns 0 to coordinates - 1 of nodes of three */
+/* Bricks with multipliers at one face; unknowns 0 to coordinates - 1 belong to nodes of three unknowns */
 class ConstraintPC : public testing::Test
 {
 protected:
@@ -36,7 +36,7 @@ protected:
     OK(VecSetRandom(b, NULL));
   }
   void bricks(PetscInt size) { create(block(size, size, size, true), 3 * (size + 1) * (size + 1) * (size + 1)); }
-  /* with the positions of all nodes, of bricks of 1/nx */
+  /* with the positions of all nodes; the bricks have the size 1/nx */
   void bar(PetscInt nx, PetscInt ny, PetscInt nz, bool clamped = true)
   {
     create(block(nx, ny, nz, clamped), 3 * (nx + 1) * (ny + 1) * (nz + 1));
@@ -100,7 +100,7 @@ protected:
     EXPECT_EQ(KSPGetConvergedReason(ksp, &reason), 0);
     return reason;
   }
-  /* largest entries of b - A y, of rows of coordinates and of constraints */
+  /* largest entries of b - A y, in rows of coordinates and of constraints */
   void left(Vec y, double *of_coordinates, double *of_constraints)
   {
     const PetscScalar *r;
@@ -145,11 +145,11 @@ public:
   }
 };
 
-/* A body whose factor is large, and the choice of its solver */
+/* A body with an expensive factorization, and the choice of its solver */
 class LargeBody : public ConstraintPC
 {
 protected:
-  static constexpr PetscInt side = 17; /* bricks; of 15 the factor is chosen */
+  static constexpr PetscInt side = 17; /* bricks along each edge; with 15 a factorization is chosen */
   LinearChoice              choice;
 
   void choose(bool positions, const char *options = NULL, bool rough = true)
@@ -181,7 +181,7 @@ protected:
     EXPECT_EQ(PetscObjectTypeCompare((PetscObject)pc, PCHHTCONSTRAINT, &is), 0);
     return is;
   }
-  /* b - A x relative to b */
+  /* norm of b - A x relative to that of b */
   double leftOf()
   {
     PetscReal all = 0;

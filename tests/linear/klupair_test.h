@@ -1,4 +1,4 @@
-/* Matrices, their planned pivots and their factors by "klupair". */
+/* Shared by the tests of "klupair": matrices, planned pivots and factors */
 #ifndef HHTDAE_TESTS_KLUPAIR_TEST_H
 #define HHTDAE_TESTS_KLUPAIR_TEST_H
 
@@ -38,7 +38,7 @@ struct Rows {
   }
 };
 
-/* A permutation; the number of its pivots that are zero */
+/* Checks that the pivots form a permutation; returns the number of zero pivots */
 inline PetscInt zero_pivots(const Rows &A, const LinearPivots &p)
 {
   std::vector<bool> met(p.col.size(), false);
@@ -61,7 +61,8 @@ inline LinearPivots pivots_of(const Triplets &entries, PetscInt zeros_left = 0)
   return p;
 }
 
-/* [D B; C 0] with as many as three quarters of multipliers, unsymmetric values, entries over six orders of magnitude */
+/* [D B; C 0] with up to three quarters of the unknowns being multipliers, unsymmetric values, entries over six orders
+   of magnitude */
 inline Triplets random_saddle(std::mt19937 &random, PetscInt coordinates, PetscInt multipliers)
 {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);

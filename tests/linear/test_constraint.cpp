@@ -1,8 +1,9 @@
-/* The preconditioner "hhtconstraint": what it leaves out, its coarse level, conjugate gradients on the constraints, what it refuses */
+/* The preconditioner "hhtconstraint": blocks of nodes, coarse level, conjugate gradients with constraints, refused input */
 #include "constraint_fixture.h"
 #include "linear/coarse.h"
 
-/* Every iterate of conjugate gradients satisfies the constraints, and they converge although the matrix is indefinite */
+/* Every iterate of conjugate gradients satisfies the constraints, and the iteration converges although the matrix is
+   indefinite */
 TEST_F(ConstraintPC, ConjugateGradientsMoveAlongTheConstraints)
 {
   double forces, constraints;
@@ -30,7 +31,7 @@ TEST_F(ConstraintPC, MinimalResidualsConvergeAsWell)
   EXPECT_LT(constraints, 1e-9);
 }
 
-/* Nodes are found by the pattern of their rows, but for those that multipliers single out */
+/* Nodes are detected by the pattern of their rows, except those that multipliers distinguish */
 TEST_F(ConstraintPC, NodesToldAndFound)
 {
   bricks(3);
@@ -44,7 +45,7 @@ TEST_F(ConstraintPC, NodesToldAndFound)
   EXPECT_GT(solve(), 0);
   EXPECT_NE(view().find("64 nodes"), std::string::npos) << view();
   EXPECT_LE(iterations(), found + 1);
-  /* one node of all: the factorization of the whole */
+  /* all unknowns as one node: the whole matrix is factored */
   nodes(coordinates);
   OK(KSPDestroy(&ksp));
   solver(KSPCG, 1e-6);
@@ -52,7 +53,7 @@ TEST_F(ConstraintPC, NodesToldAndFound)
   EXPECT_LE(iterations(), 1);
 }
 
-/* Nodes of the same matrix that are told anew, and are no longer told */
+/* The nodes of the same matrix are given anew, and then no longer given */
 TEST_F(ConstraintPC, FollowsTheNodes)
 {
   bricks(3);
@@ -60,7 +61,7 @@ TEST_F(ConstraintPC, FollowsTheNodes)
   solver(KSPCG, 1e-6);
   EXPECT_GT(solve(), 0);
   EXPECT_GT(iterations(), 1);
-  nodes(coordinates); /* one node of all: the factorization of the whole */
+  nodes(coordinates); /* all unknowns as one node: the whole matrix is factored */
   OK(MatScale(A, 2));
   EXPECT_GT(solve(), 0);
   EXPECT_LE(iterations(), 1);
@@ -70,7 +71,7 @@ TEST_F(ConstraintPC, FollowsTheNodes)
   EXPECT_NE(view().find(std::to_string(64 + 2 * 16) + " nodes"), std::string::npos) << view();
 }
 
-/* New values in the old pattern, and another matrix */
+/* New values in the same pattern, and another matrix */
 TEST_F(ConstraintPC, FollowsTheMatrix)
 {
   double forces, constraints;
@@ -94,7 +95,7 @@ TEST_F(ConstraintPC, FollowsTheMatrix)
   EXPECT_LT(forces, 1e-7);
 }
 
-/* Constraints that say the same thing twice: the solve fails, and says so */
+/* With dependent constraints the solve fails with an error that says so */
 TEST_F(ConstraintPC, DependentConstraintsFail)
 {
   Triplets e = block(2, 2, 2, true);
@@ -105,7 +106,7 @@ TEST_F(ConstraintPC, DependentConstraintsFail)
   EXPECT_LT(solve(), 0);
 }
 
-/* What the whole body does crosses it in one iteration, not brick by brick */
+/* With a coarse level, motions of the whole body are solved in one iteration instead of spreading brick by brick */
 TEST_F(ConstraintPC, CoarseLevelKeepsIterationsDown)
 {
   PetscInt without[2], with[2], i = 0;
@@ -120,7 +121,8 @@ TEST_F(ConstraintPC, CoarseLevelKeepsIterationsDown)
   EXPECT_LT(with[1], without[1] / 2);
 }
 
-/* Its solves go by panels from the first matrix on, also where these would not pay for one factorization */
+/* The coarse level is factored by panels from the first matrix on, because its many solves benefit even if a single
+   factorization would not */
 TEST_F(ConstraintPC, CoarseLevelByPanels)
 {
   bar(12, 4, 4);
@@ -147,7 +149,8 @@ TEST_F(ConstraintPC, CoarseLevelMovesAlongTheConstraints)
   EXPECT_NE(view().find("coarse level: 8 aggregates, " + std::to_string(6 * 8 + 2 * 3 * 25) + " unknowns"), std::string::npos) << view();
 }
 
-/* Of a block that is not held and moves as one aggregate A_c is its mass and its moments of inertia, in units of its size: stiffness has no part in it */
+/* For a free block that is a single aggregate, A_c consists of its mass and its moments of inertia, scaled by its
+   size; stiffness does not contribute */
 TEST_F(ConstraintPC, AggregateIsARigidBody)
 {
   const PetscInt size[3] = {8, 4, 2};
@@ -157,7 +160,7 @@ TEST_F(ConstraintPC, AggregateIsARigidBody)
   PetscBool      failed;
   PetscObject    positions;
   bar(size[0], size[1], size[2], false);
-  MatrixNodes nodes; /* nothing but nodes */
+  MatrixNodes nodes; /* only coordinates */
   for (PetscInt i = 0; i < n; i += 3) nodes.node_blocks.push_back(i);
   solver(KSPCG, 1e-6);
   OK(KSPGetPC(ksp, &pc));
@@ -176,7 +179,7 @@ TEST_F(ConstraintPC, AggregateIsARigidBody)
   OK(CoarseDestroy(&coarse));
 }
 
-/* Nodes on a line are no rigid body: each keeps its own unknowns */
+/* Nodes on a line do not form a rigid body with six motions: each keeps its own unknowns */
 TEST_F(ConstraintPC, NodesOnALineStandApart)
 {
   bar(6, 2, 2);

@@ -1,4 +1,4 @@
-/* The solver type "klupair": what it solves, when it keeps its pivots, what it does without */
+/* The solver type "klupair": solutions, kept and rejected pivots, singular matrices, orderings */
 #include "klupair_test.h"
 #include <algorithm>
 #include <hhtdae/hhtdae.h>
@@ -93,7 +93,7 @@ TEST_F(KluPair, KeepsItsPivots)
   EXPECT_EQ(c.given_up, 0);
 }
 
-/* Every tenth multiplier loses the entry that it was paired by; all of them are held by others still */
+/* Every tenth multiplier loses the entry with which it was paired; other entries still determine all multipliers */
 TEST_F(KluPair, GivesUpBadPivots)
 {
   for (double left : {0.0, 1e-13}) {
@@ -114,8 +114,8 @@ TEST_F(KluPair, GivesUpBadPivots)
   }
 }
 
-/* Every pivot as planned is a 900th of its column, which the pivot tolerance lets pass, and entries grow by that factor from one to the next. The
-   matrix itself is well conditioned. */
+/* Each planned pivot is 1/900 of the largest entry in its column, which the pivot tolerance accepts, and entries grow
+   by this factor from one pivot to the next, although the matrix is well conditioned */
 TEST_F(KluPair, PivotsAsPlannedThatLetEntriesGrow)
 {
   for (bool rows : {false, true}) {
@@ -133,8 +133,9 @@ TEST_F(KluPair, PivotsAsPlannedThatLetEntriesGrow)
   }
 }
 
-/* Two and two unknowns, and one coupled to all. Without diagonals the large entries of the last one would be the
-   pivots, and its row would fill the factors; paired anew, the others do among themselves. */
+/* Two pairs of unknowns, and one unknown coupled to all of them. Without diagonal entries the large entries of the
+   last unknown would be the pivots, and its row would fill the factors; when pivots are planned anew, the other
+   unknowns are paired among themselves */
 TEST_F(KluPair, PlansAnewWhenTheFillGrows)
 {
   const PetscInt n = 400;
@@ -187,7 +188,7 @@ TEST_F(KluPair, AnotherPatternIsAnalysedAnew)
   EXPECT_LT(residual(), 1e-12);
 }
 
-/* Another matrix of the same pattern costs a comparison and no analysis */
+/* Another matrix with the same pattern needs a comparison but no analysis */
 TEST_F(KluPair, AnotherMatrixOfThePattern)
 {
   factor(spatial_chain(30));
@@ -221,7 +222,8 @@ TEST_F(KluPair, SingularMatricesAreReported)
   }
 }
 
-/* As interiors of ranks are that hold multipliers alone, the unknowns of which are all at the border of the next rank */
+/* An empty matrix, as on ranks whose interior has only multipliers, all unknowns of which belong to the interface of
+   the next rank */
 TEST_F(KluPair, MatrixWithoutEntries)
 {
   Triplets nothing;
@@ -245,7 +247,7 @@ TEST_F(KluPair, ValuesThatAreNotFinite)
   }
 }
 
-/* The KSP fails as PETSc's do, and recovers when the matrix does */
+/* The KSP fails like with PETSc's packages, and works again when the matrix is regular */
 TEST_F(KluPair, SolverFailsAndRecovers)
 {
   KSP                ksp;
@@ -283,7 +285,7 @@ TEST_F(KluPair, SolverFailsAndRecovers)
   OK(KSPDestroy(&ksp));
 }
 
-/* ---- orderings and what the factor says of itself ---- */
+/* ---- orderings and information about the factor ---- */
 
 TEST_F(KluPair, OrderingsSolveAndSayTheirName)
 {
@@ -330,7 +332,7 @@ TEST_F(KluPair, GivenOrderingIsFollowed)
   OK(ISDestroy(&col));
 }
 
-/* A triangular matrix in disguise has no fill, and is solved with transposes and new values as any other */
+/* A permuted triangular matrix has no fill; it is solved, also transposed and with new values, like any other */
 TEST_F(KluPair, BlocksOfAReducibleMatrix)
 {
   std::mt19937          random(17);
@@ -358,7 +360,7 @@ TEST_F(KluPair, BlocksOfAReducibleMatrix)
   EXPECT_EQ(counts().analyses, 1);
 }
 
-/* Where the planned pivots are kept, the factors have exactly the entries foreseen for one diagonal block */
+/* If the planned pivots are kept, the factors have exactly the predicted number of entries for a single diagonal block */
 TEST_F(KluPair, FillIsAsForeseen)
 {
   MatInfo got;

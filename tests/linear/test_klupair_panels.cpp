@@ -7,8 +7,8 @@
 namespace
 {
 
-/* A body with modes, dense and with values that are not symmetric, that carries others by constraints on all modes;
-   each of these carries a little chain */
+/* A body with dense unsymmetric modal blocks that carries other bodies by constraints on all modes; each of these
+   carries a short chain */
 Triplets modal_carrier(std::mt19937 &random, PetscInt modes, PetscInt attachments)
 {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
@@ -36,7 +36,7 @@ Triplets modal_carrier(std::mt19937 &random, PetscInt modes, PetscInt attachment
   return e;
 }
 
-/* Diagonal blocks, dense in themselves, with entries from each to those after it; unknowns shuffled */
+/* Dense diagonal blocks with entries coupling each to the following ones; unknowns in random order */
 Triplets dense_blocks(std::mt19937 &random, PetscInt blocks, PetscInt size)
 {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
@@ -59,7 +59,7 @@ class KluPairPanels : public KluPair
 protected:
   const std::string used = "dense panels for these pivots";
 
-  /* Every value a little different, structural zeros stay */
+  /* Changes every value slightly; structural zeros stay */
   void change(std::mt19937 &random, double part = 0.1)
   {
     std::uniform_real_distribution<double> uniform(1 - part, 1 + part);
@@ -77,7 +77,7 @@ protected:
     EXPECT_EQ(error(), expected);
   }
 
-  /* Of coupled_blocks() this part of A and B, and the coupling whole */
+  /* Keeps this part of A and B of coupled_blocks(), and the whole coupling */
   void leave(double part, PetscInt n)
   {
     OK(MatScale(A, part));
@@ -87,7 +87,7 @@ protected:
     }
   }
 
-  /* The same matrix without panels, and without old pivots */
+  /* Compares with the solution without panels and without old pivots */
   void expect_same_solution(double tolerance)
   {
     Mat       fresh;
@@ -133,8 +133,8 @@ TEST_F(KluPairPanels, SameSolutionsForChangingValues)
   }
 }
 
-/* Sparse saddle points with a dense corner of every size: also narrow panels, and pivots that KLU chose otherwise than
-   planned */
+/* Sparse saddle points with a dense corner of any size, including narrow panels and pivots that KLU chose differently
+   from the plan */
 TEST_F(KluPairPanels, RandomSaddlePoints)
 {
   std::mt19937 random(23);
@@ -170,7 +170,7 @@ TEST_F(KluPairPanels, SeveralDiagonalBlocks)
   }
 }
 
-/* [A I; I B], of which A and B are diagonally dominant */
+/* [A I; I B] with diagonally dominant A and B */
 Triplets coupled_blocks(std::mt19937 &random, PetscInt n)
 {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
@@ -184,7 +184,7 @@ Triplets coupled_blocks(std::mt19937 &random, PetscInt n)
   return e;
 }
 
-/* Nothing or nearly nothing remains of A and B */
+/* Almost nothing remains of A and B */
 TEST_F(KluPairPanels, GivesUpBadPivots)
 {
   std::mt19937   random(9);
@@ -207,7 +207,7 @@ TEST_F(KluPairPanels, GivesUpBadPivots)
   }
 }
 
-/* Pivots that were just found are used again for panels where hundreds of solves follow */
+/* Where hundreds of solves follow, pivots that have just been found are used again for panels */
 TEST_F(KluPairPanels, AtOnceForManySolves)
 {
   std::mt19937   random(11);
@@ -227,7 +227,7 @@ TEST_F(KluPairPanels, AtOnceForManySolves)
   }
 }
 
-/* The same errors as without panels, and none once the matrix is regular again */
+/* The same errors as without panels, and no error once the matrix is regular again */
 TEST_F(KluPairPanels, SingularMatricesAreReported)
 {
   std::mt19937  random(13);
@@ -251,7 +251,7 @@ TEST_F(KluPairPanels, SingularMatricesAreReported)
   OK(PetscOptionsClearValue(NULL, "-mat_klupair_panels"));
 }
 
-/* Nothing is allocated where nothing is dense, nor for what panels do not know */
+/* Panels allocate nothing where there are no dense parts, or where they are not supported */
 TEST_F(KluPairPanels, OnlyWhereTheyPay)
 {
   std::mt19937 random(15);

@@ -24,8 +24,8 @@ TEST(KluPairPivots, EveryMultiplierHasItsCoordinate)
   }
 }
 
-/* As many constraints as coordinates, and each multiplier but the last prefers the coordinate of the next one: only an
-   exchange along the whole row of them leaves one for everybody */
+/* As many constraints as coordinates, where each multiplier except the last prefers the coordinate of the next one:
+   only an exchange along the whole row leaves a coordinate for each */
 TEST(KluPairPivots, LongExchange)
 {
   const PetscInt n = 3000;
@@ -75,7 +75,7 @@ TEST(KluPairPivots, TwoUnknownsWithoutDiagonal)
   EXPECT_EQ(pivots_of(e).col, (std::vector<PetscInt>{1, 0, 2}));
 }
 
-/* No two rows exchange their pivots here: a cycle of three */
+/* No two rows can exchange their pivots here: a cycle of three is needed */
 TEST(KluPairPivots, UnsymmetricCycle)
 {
   Triplets e;
@@ -84,7 +84,7 @@ TEST(KluPairPivots, UnsymmetricCycle)
   EXPECT_EQ(pivots_of(e).col, (std::vector<PetscInt>{1, 2, 0}));
 }
 
-/* Two multipliers of one coordinate, and a row without any entry */
+/* Two multipliers for one coordinate, and a row without entries */
 TEST(KluPairPivots, SingularByItsPattern)
 {
   Triplets e;
@@ -94,10 +94,10 @@ TEST(KluPairPivots, SingularByItsPattern)
   e.add_symmetric(2, 0, 1.0);
   e.add(3, 3, 0.0);
   const LinearPivots p = pivots_of(e, 2);
-  EXPECT_EQ(p.unmatched, 1); /* the third row has a place by its pattern */
+  EXPECT_EQ(p.unmatched, 1); /* the pattern provides a pivot for the third row */
 }
 
-/* Ten times as many bodies: ten times as many entries looked at */
+/* For ten times as many bodies ten times as many entries are examined */
 TEST(KluPairPivots, WorkGrowsWithTheChain)
 {
   for (PetscInt loops : {0, 8}) {
@@ -131,7 +131,7 @@ TEST(KluPairPivots, MatchingIsALargestOne)
       EXPECT_EQ(of_right[of_left[l]], l);
       ++size;
     }
-    /* Hall: by the subset of left vertices that lacks most neighbours */
+    /* Hall's theorem: by the subset of left vertices with the largest lack of neighbours */
     PetscInt lacking = 0;
     for (unsigned set = 0; set < 1u << n; ++set) {
       unsigned neighbours = 0;

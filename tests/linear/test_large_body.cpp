@@ -1,4 +1,5 @@
-/* A body whose factor is large: when conjugate gradients take its place, and the way back where they do not serve */
+/* A body with an expensive factorization: when conjugate gradients replace the factorization, and when the
+   factorization returns because they fail */
 #include "constraint_fixture.h"
 
 TEST_F(LargeBody, ConjugateGradientsTakeThePlaceOfItsFactor)
@@ -11,7 +12,7 @@ TEST_F(LargeBody, ConjugateGradientsTakeThePlaceOfItsFactor)
   OK(LinearGiveUpKrylov(ksp, A, &choice, &changed));
   EXPECT_FALSE(changed);
   LinearChoice anew;
-  OK(LinearDefaults(ksp, &anew)); /* another set-up: what was chosen is not taken for the user's */
+  OK(LinearDefaults(ksp, &anew)); /* in another set-up the earlier choice is not taken for the user's */
   EXPECT_FALSE(anew.user_pc);
 }
 
@@ -25,12 +26,12 @@ TEST_F(LargeBody, AFactorWhereTheyDoNotServe)
   EXPECT_TRUE(changed);
   EXPECT_FALSE(isConstraint()) << choice.text;
   EXPECT_GT(solve(), 0);
-  EXPECT_LT(leftOf(), 1e-3); /* of a factor in single precision at least */
+  EXPECT_LT(leftOf(), 1e-3); /* at least the accuracy of a factorization in single precision */
   OK(LinearChoose(ksp, A, PETSC_TRUE, &choice));
   EXPECT_FALSE(isConstraint()) << "they are not tried again";
 }
 
-/* Rows of multipliers that are not the transpose of their columns, as those of joints and motions: half of what they were */
+/* The rows of multipliers are not the transpose of their columns, as with joints and motions: here they are half as large */
 TEST_F(LargeBody, ConjugateGradientsWhereSymmetryIsLost)
 {
   Vec       scale;

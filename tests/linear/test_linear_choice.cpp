@@ -1,4 +1,4 @@
-/* Which solver KSP gets: by the matrix, by options, by the program */
+/* Which solver a KSP gets, depending on the matrix, on options and on the program */
 #include "linear/choose.h"
 #include "bench/linear_matrices.h"
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ struct Chosen {
   LinearChoice choice;
 };
 
-/* Sets options, lets the program do its part, and returns what the two functions make of it */
+/* Sets options, lets the program make its settings, and returns the result of the two functions */
 template <typename Program>
 Chosen choose(Mat A, bool symmetric, const std::vector<const char *> &options, Program program,
               const char prefix[] = "")
@@ -106,7 +106,8 @@ TEST_F(LinearChoiceTest, BlockTakesMUMPS)
   EXPECT_FALSE(unsymmetric.choice.cholesky);
 }
 
-/* A large factor is of single precision if the caller's own iteration removes the error of its solves, unless the user has said otherwise */
+/* A large factorization is in single precision if the caller's iteration removes the error of its solves, unless the
+   user has chosen otherwise */
 TEST_F(LinearChoiceTest, LargeFactorsAreSingle)
 {
   Mat  A;
@@ -145,7 +146,7 @@ TEST_F(LinearChoiceTest, LargeFactorsAreSingle)
   EXPECT_EQ(choose(large, true, {}, [](KSP, PC) {}).package, "mumpsnd");
 }
 
-/* 645 unknowns with one dense block want MUMPS, 5000 in a chain do not: size alone does not decide */
+/* A matrix of 645 unknowns with one dense block gets MUMPS, a chain of 5000 does not: size alone does not decide */
 TEST_F(LinearChoiceTest, DenseBlockTakesMUMPS)
 {
   Triplets entries = chain(1, 640);
@@ -179,7 +180,7 @@ TEST_F(LinearChoiceTest, OrderingOptionReachesTheFactor)
   Vec          b, x;
   OK(PetscOptionsCreate(&database));
   OK(PetscOptionsInsertString(database, "-pc_factor_mat_ordering_type hhtdae_test"));
-  /* An ordering of our own tells whether it was asked */
+  /* An ordering of our own that counts its calls */
   static int called;
   called = 0;
   OK(MatOrderingRegister("hhtdae_test", [](Mat A, MatOrderingType, IS *r, IS *c) -> PetscErrorCode {
@@ -209,7 +210,7 @@ TEST_F(LinearChoiceTest, OrderingOptionReachesTheFactor)
   OK(PetscOptionsDestroy(&database));
 }
 
-/* A factor that takes the place of conjugate gradients reads the options which their preconditioner has not */
+/* A factorization that replaces conjugate gradients reads the options that their preconditioner did not read */
 TEST_F(LinearChoiceTest, OrderingOptionReachesALaterFactor)
 {
   KSP          ksp;
@@ -242,7 +243,7 @@ TEST_F(LinearChoiceTest, OrderingOptionReachesALaterFactor)
   OK(KSPDestroy(&ksp));
 }
 
-/* The factor has the name that was asked for, or PETSc would take the same choice for another one */
+/* The factor has the name under which it was requested; otherwise PETSc would take the same choice for another one */
 TEST_F(LinearChoiceTest, APackageIsChosenTwice)
 {
   for (const char *package : {"klupair", "kluparts", "mumpsnd", "mumpsmixed"}) {
@@ -277,7 +278,7 @@ TEST_F(LinearChoiceTest, ProgramWins)
   EXPECT_EQ(choose(large, true, {}, klu).pc, PCLU);
 }
 
-/* TSSetFromOptions() may come more than once */
+/* TSSetFromOptions() may be called more than once */
 TEST_F(LinearChoiceTest, SecondLookKnowsItsOwnDefaults)
 {
   const auto before = [](KSP k, PC) {
@@ -293,7 +294,8 @@ TEST_F(LinearChoiceTest, SecondLookKnowsItsOwnDefaults)
   EXPECT_EQ(c.package, "mumpsnd");
 }
 
-/* Nor is a package that was chosen taken for the program's in another set-up, and the program's is seen whenever it is named */
+/* A package that was chosen automatically is not taken for the program's choice in another set-up; the program's
+   choice is respected whenever it is made */
 TEST_F(LinearChoiceTest, SecondLookAfterAChoice)
 {
   KSP          ksp;
@@ -317,7 +319,7 @@ TEST_F(LinearChoiceTest, SecondLookAfterAChoice)
   OK(KSPDestroy(&ksp));
 }
 
-/* The factor gets the package's own ordering, not the one that PETSc prefers for its own factorization */
+/* The factorization uses the package's own ordering, not the one that PETSc prefers for its own factorization */
 TEST_F(LinearChoiceTest, PackageOrdersByItself)
 {
   KSP           ksp;
@@ -345,7 +347,7 @@ TEST_F(LinearChoiceTest, PackageOrdersByItself)
   OK(MatDestroy(&F));
 }
 
-/* Symmetry is lost between two solves: L D L^T gives way to LU on the same KSP */
+/* If symmetry is lost between two solves, L D L^T is replaced by LU in the same KSP */
 TEST_F(LinearChoiceTest, TurnsToLUWhenSymmetryIsLost)
 {
   KSP          ksp;

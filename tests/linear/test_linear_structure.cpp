@@ -1,4 +1,4 @@
-/* What is read off a matrix: orderings and their work, symmetry, the names of redundant constraints */
+/* What is derived from a matrix: orderings and their work, symmetry, names of redundant constraints */
 #include "linear/graph.h"
 #include "linear/linear.h"
 #include "bench/linear_matrices.h"
@@ -42,7 +42,7 @@ LinearWork work_of(Mat A, const std::vector<PetscInt> &order)
   return work;
 }
 
-/* Entries of L by elimination of a dense Boolean matrix */
+/* Number of entries of L, by elimination of a dense Boolean matrix */
 LinearWork work_by_elimination(Mat A, const std::vector<PetscInt> &order)
 {
   const PetscInt                 n = (PetscInt)order.size();
@@ -110,7 +110,7 @@ TEST(LinearOrdering, DiagonalMatrixHasNoEdges)
   OK(MatDestroy(&A));
 }
 
-/* The direction of the permutation shows in the fill of PETSc's own factorization */
+/* The direction of the permutation is visible in the fill of PETSc's own factorization */
 TEST(LinearOrdering, PetscFactorsWithLessFill)
 {
   Triplets       entries = block(5, 5, 5, false);
@@ -182,7 +182,7 @@ TEST(LinearSymmetry, IsSeen)
   OK(LinearIsSymmetric(A, &symmetric));
   EXPECT_TRUE(symmetric);
 
-  /* Large and small scales side by side, as masses in kg and inertias of small parts */
+  /* Large and small scales in one matrix, as for masses in kg and moments of inertia of small parts */
   Vec d;
   OK(MatCreateVecs(A, &d, NULL));
   for (PetscInt i = 0; i < entries.n; ++i)
@@ -202,7 +202,7 @@ TEST(LinearSymmetry, OneWrongEntryIsSeen)
     Triplets   entries = chain(200, 3);
     Mat       A;
     PetscBool symmetric;
-    entries.add(301, 300, relative); /* row and column of one body, entries of order one */
+    entries.add(301, 300, relative); /* row and column of one body, with entries of order one */
     OK(create_matrix(entries, &A));
     OK(LinearIsSymmetric(A, &symmetric));
     EXPECT_FALSE(symmetric) << relative;
@@ -244,7 +244,7 @@ TEST(LinearDependent, DoubledConstraint)
   EXPECT_EQ(dependent(entries, first), (std::vector<PetscInt>{twice, row}));
 }
 
-/* Two independent dependences at once, of very different scale: all rows of both are named, and no others */
+/* Two independent dependences of very different scale: all rows of both are named, and no others */
 TEST(LinearDependent, TwoDependencesOfDifferentScale)
 {
   Triplets        entries = chain(40, 0);
@@ -258,7 +258,8 @@ TEST(LinearDependent, TwoDependencesOfDifferentScale)
   EXPECT_EQ(dependent(entries, first, 2).size(), 2u);
 }
 
-/* A loop: distances of three points on a line fixed pairwise, x2-x1, x3-x2, x1-x3; the fourth constraint is apart */
+/* A loop: the pairwise distances of three points on a line are fixed, x2-x1, x3-x2, x1-x3; the fourth constraint is
+   independent */
 TEST(LinearDependent, Loop)
 {
   Triplets e;

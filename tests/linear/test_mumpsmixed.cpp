@@ -1,4 +1,4 @@
-/* Factors in single precision: what solves with them are worth, and when double precision takes over */
+/* Factorizations in single precision: accuracy of solves, and when double precision replaces them */
 #include "bench/linear_matrices.h"
 #include "linear/linear.h"
 #include "linear/memory.h"
@@ -13,18 +13,18 @@
 #include <string>
 
 #define OK(call) ASSERT_EQ((call), 0)
-#define OKIN(call) EXPECT_EQ((call), 0) /* in functions with results */
+#define OKIN(call) EXPECT_EQ((call), 0) /* for functions with results */
 
 namespace
 {
 
-/* A KSP with the factorization named, and a solution that is known */
+/* A KSP with this factorization, and a known solution */
 struct Solver {
   Mat       A;
   KSP       ksp;
   PC        pc;
   Vec       known, b, x;
-  PetscReal error = -1; /* relative to the solution known */
+  PetscReal error = -1; /* relative to the known solution */
 
   Solver(Mat matrix, const char package[], const char type[] = PCCHOLESKY) : A(matrix)
   {
@@ -78,7 +78,7 @@ struct Solver {
   }
 };
 
-/* The stiffness of a rod, held at its ends: its condition grows like n^2 */
+/* The stiffness matrix of a rod held at its ends, whose condition number grows like n^2 */
 Triplets rod(PetscInt n)
 {
   Triplets e;
@@ -90,7 +90,7 @@ Triplets rod(PetscInt n)
   return e;
 }
 
-/* The first node of a block held twice */
+/* A block whose first node is held twice */
 Triplets redundant(PetscInt side)
 {
   Triplets e = block(side, side, side, true);
@@ -122,7 +122,7 @@ protected:
     OK(create_matrix(e, &A));
   }
 
-  /* No longer symmetric */
+  /* Makes the matrix unsymmetric */
   void skew()
   {
     OK(MatSetValue(A, 0, 1, 5.0, INSERT_VALUES));
@@ -162,7 +162,7 @@ TEST_F(MumpsMixed, SolvesToDoublePrecision)
   EXPECT_LT(s.error, 1e-12);
 }
 
-/* Half of the memory, which is why it is there */
+/* It uses half of the memory, which is its purpose */
 TEST_F(MumpsMixed, TakesHalfTheMemory)
 {
   PetscInt bytes[2];
@@ -178,7 +178,7 @@ TEST_F(MumpsMixed, TakesHalfTheMemory)
   EXPECT_LT((double)bytes[1], 0.6 * (double)bytes[0]);
 }
 
-/* One sweep while the caller removes the error, as many as it takes before and after */
+/* One solve without refinement while the caller removes the error; with as many refinements as needed before and after */
 TEST_F(MumpsMixed, RoughSolves)
 {
   Solver s(A, "mumpsmixed");
@@ -193,7 +193,8 @@ TEST_F(MumpsMixed, RoughSolves)
   EXPECT_LT(s.error, 1e-12);
 }
 
-/* The factor of a matrix that has changed since answers as any other old factor does: nothing is refined towards a mixture of both */
+/* An old factor of a changed matrix solves with its own matrix, like any other old factor: refinement must not mix
+   both matrices */
 TEST_F(MumpsMixed, AnOldFactorStaysOne)
 {
   Solver old(A, "mumpsnd"), s(A, "mumpsmixed");
@@ -265,7 +266,7 @@ TEST_F(MumpsMixed, SingularMatrixIsReported)
   EXPECT_TRUE(A->erroriffailure);
 }
 
-/* A matrix that is not a number is no reason to wait for ever, nor a solution */
+/* A matrix with NaN neither causes an endless wait nor gives a solution */
 TEST_F(MumpsMixed, MatrixThatIsNotANumber)
 {
   OK(MatSetValue(A, 4, 4, NAN, INSERT_VALUES));
@@ -278,7 +279,7 @@ TEST_F(MumpsMixed, MatrixThatIsNotANumber)
   }
 }
 
-/* Regular, but not to single precision */
+/* Regular, but singular to single precision */
 TEST_F(MumpsMixed, BadConditionTakesDoublePrecision)
 {
   create(rod(300));
@@ -297,7 +298,8 @@ TEST_F(MumpsMixed, BadConditionTakesDoublePrecision)
   OK(MatDestroy(&B));
 }
 
-/* With the controls that the program has set; after every fall back twice as many matrices get double precision before single precision is tried again */
+/* With the MUMPS controls that the program has set. After every fallback, twice as many matrices are factored in
+   double precision before single precision is tried again */
 TEST_F(MumpsMixed, FallsBackAndReturns)
 {
   Mat         F;
@@ -334,7 +336,8 @@ TEST_F(MumpsMixed, SmallWorkspaceGrows)
   EXPECT_NE(s.text().find("factors in single precision"), std::string::npos) << s.text();
 }
 
-/* What the analysis foresees does not fit: nothing is begun, with every package, and on its way to double precision as well */
+/* If the predicted memory is not available, no factorization is begun, with every package, and also when falling back
+   to double precision */
 TEST_F(MumpsMixed, NoRoom)
 {
   create(block(12, 12, 12, true)); /* 22 MB in single precision, 40 in double */
@@ -360,13 +363,13 @@ TEST_F(MumpsMixed, NoRoom)
   EXPECT_FALSE(solved("mumpsmixed", "30"));
 }
 
-/* Where double precision has no room, what single precision says of a matrix counts: one that is singular is no want of room, one that is
-   solved roughly is solved, and the next one is factored as ever */
+/* If there is no memory for double precision, the result in single precision counts: a singular matrix is not reported
+   as lack of memory, a matrix that is solved inaccurately is solved, and the next one is factored as usual */
 TEST_F(MumpsMixed, NoRoomToFallBack)
 {
   Triplets       singular = redundant(8), loose = block(8, 8, 8, true);
   const PetscInt first    = loose.n;
-  for (PetscInt i = first; i < first + 100; i++) { /* a chain of springs that next to nothing holds */
+  for (PetscInt i = first; i < first + 100; i++) { /* a chain of springs that is hardly held */
     const double k = 1 + 0.1 * std::sin(i);
     loose.add(i, i, i > first ? k : 1e-5);
     if (i == first) continue;
@@ -402,7 +405,7 @@ TEST_F(MumpsMixed, NoRoomToFallBack)
     s.solve();
     EXPECT_LT(s.error, 1e-8);
   }
-  /* a hold so loose that a solve cannot be refined does not cost the next ones their factor */
+  /* a support so weak that solves cannot be refined does not prevent later factorizations */
   loose.add(first, first, 1e-7 - 1e-5);
   OK(PetscOptionsSetValue(NULL, "-mat_mumps_cntl_3", "1e-9")); /* no null pivot yet */
   create(loose);
@@ -424,7 +427,7 @@ TEST_F(MumpsMixed, NoRoomToFallBack)
   OK(PetscOptionsClearValue(NULL, "-mat_mumps_memory"));
 }
 
-/* In place of a factor without room, if nobody asked for one */
+/* The solver that replaces a factorization without enough memory, if the user has not chosen one */
 TEST_F(MumpsMixed, WhatSolvesWithoutRoom)
 {
   for (PetscBool symmetric : {PETSC_TRUE, PETSC_FALSE}) {
@@ -470,7 +473,7 @@ TEST(Memory, OfTheMachine)
   EXPECT_GT(m.free, 0.5 * free);
 }
 
-/* As the kernel writes it: a limit holds for all groups below the one that has it (SLURM's jobs, systemd's slices) */
+/* Files as the kernel writes them: a limit applies to all groups below its group (SLURM jobs, systemd slices) */
 TEST(Memory, OfControlGroups)
 {
   char root[] = "/tmp/hhtdae_memory_XXXXXX";

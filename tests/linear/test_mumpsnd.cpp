@@ -11,7 +11,7 @@
 namespace
 {
 
-/* A solve with the factorization named; the residual relative to the right-hand side */
+/* Solves with this factorization; returns the residual relative to the right-hand side */
 double residual_with(Mat A, const char pc_type[], const char package[], const char ordering[], bool transposed = false)
 {
   KSP       ksp;
@@ -100,7 +100,7 @@ TEST_F(MumpsND, OptionsReachMUMPS)
   OK(PetscOptionsClearValue(NULL, "-mat_mumps_icntl_14"));
 }
 
-/* Of the orderings that MUMPS has inside none takes fewer operations than the one that we pass */
+/* None of MUMPS' built-in orderings takes fewer operations than the ordering that we pass */
 TEST_F(MumpsND, OrderingIsNoWorseThanTheBuiltInOnes)
 {
   MatFactorInfo info;
@@ -151,7 +151,7 @@ TEST_F(MumpsND, SingularMatrixIsReported)
   }
 }
 
-/* All columns of a dense right-hand side at once, and of a factor that failed */
+/* Solves for all columns of a dense right-hand side at once, also with a factorization that has failed */
 TEST_F(MumpsND, SolvesManyRightHandSides)
 {
   const PetscInt columns = 70;

@@ -1,4 +1,4 @@
-/* Products in single precision and how the preconditioner "hhtconstraint" uses them */
+/* Matrix-vector products in single precision, and how the preconditioner "hhtconstraint" uses them */
 #include "bench/linear_matrices.h"
 #include "linear/constraint.h"
 #include "linear/node_product.h"
@@ -9,7 +9,7 @@
 #include <vector>
 
 #define OK(call)       ASSERT_EQ((call), 0)
-#define OK_VALUE(call) EXPECT_EQ((call), 0) /* in functions that return a value */
+#define OK_VALUE(call) EXPECT_EQ((call), 0) /* for functions that return a value */
 
 namespace
 {
@@ -48,7 +48,7 @@ protected:
     for (Vec *v : {&x, &b, &y}) OK(VecDestroy(v));
     OK(MatDestroy(&A));
   }
-  /* Largest difference of products with x, relative to the largest entry: of rows of coordinates and of constraints */
+  /* Largest difference of the products with x, relative to the largest entry, in rows of coordinates and of constraints */
   void difference(NodeProduct &p, double *of_coordinates, double *of_constraints)
   {
     const PetscScalar *one, *other;
@@ -104,7 +104,8 @@ protected:
 
 } // namespace
 
-/* To the digits of single precision, of constraints to those of double; blocks of a matrix that is not symmetric are stored all */
+/* Rows of coordinates agree to single precision, rows of constraints to double precision; of an unsymmetric matrix all
+   blocks are stored */
 TEST_F(NodeProductTest, AgreesWithTheMatrix)
 {
   NodeProduct p;
@@ -135,7 +136,8 @@ TEST_F(NodeProductTest, AgreesWithTheMatrix)
   OK(NodeProductDestroy(&p));
 }
 
-/* In a matrix of two million entries a single one that is not symmetric, small, but far above the rounding of single precision */
+/* In a matrix of two million entries a single entry is unsymmetric, by a small amount far above the rounding of single
+   precision */
 TEST(NodeProduct, OneUnsymmetricEntry)
 {
   Mat                   A;
@@ -158,7 +160,7 @@ TEST(NodeProduct, OneUnsymmetricEntry)
   OK(NodeProductFill(A, node, true, &p, &usable));
   EXPECT_FALSE(p.symmetric);
   OK(MatCreateVecs(A, &x, &y));
-  OK(VecSetValue(x, first, 1, INSERT_VALUES)); /* its column: not a part of the transposed entry */
+  OK(VecSetValue(x, first, 1, INSERT_VALUES)); /* a vector for its column only, so that the transposed entry does not contribute */
   OK(VecAssemblyBegin(x));
   OK(VecAssemblyEnd(x));
   OK(MatMult(p.shell, x, y));
@@ -172,7 +174,7 @@ TEST(NodeProduct, OneUnsymmetricEntry)
   OK(MatDestroy(&A));
 }
 
-/* A few digits are a matter of single precision, many are not; and the operator of the user is the same as before */
+/* For a few digits single precision is used, for many it is not; the user's operator is unchanged afterwards */
 TEST_F(NodeProductTest, ServesFewDigits)
 {
   Mat of_user;
@@ -202,14 +204,15 @@ TEST_F(NodeProductTest, OutOfRange)
   EXPECT_LT(left(), 0.1);
 }
 
-/* Springs to the ground that are soft beside what couples the nodes: what moves the whole body is lost in rounding of single precision */
+/* Springs to the ground that are weak compared with those between nodes: the stiffness of rigid motions is lost in the
+   rounding of single precision */
 TEST_F(NodeProductTest, RoundingIsMeasured)
 {
   const PetscInt first = coordinates;
   OK(MatDestroy(&A));
   Triplets e = block(4, 3, 3, false);
   OK(create_matrix(e, &A));
-  /* 1e10 (A - its row sums of each component) + 1 leaves rigid translations the stiffness of the springs alone */
+  /* In 1e10 (A - its row sums of each component) + 1 rigid translations have only the stiffness of the springs */
   for (PetscInt i = 0; i < first; i++) {
     PetscScalar        sum = 0;
     PetscInt           m;

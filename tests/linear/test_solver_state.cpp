@@ -1,4 +1,5 @@
-/* What a solver takes over from that of another run: LinearSaveState(), LinearLoadState() with "hhtconstraint" and the choice of the solver */
+/* The state that a solver takes over from a solver of another run: LinearSaveState(), LinearLoadState() with
+   "hhtconstraint" and the choice of the solver */
 #include "constraint_fixture.h"
 #include <cstdint>
 #include <cstring>
@@ -6,7 +7,7 @@
 namespace
 {
 
-/* A solver of one run, and that of another one with the same matrix which takes over its state */
+/* A solver of one run, and a solver of another run with the same matrix that takes over its state */
 class SolverState : public LargeBody
 {
 protected:
@@ -21,7 +22,7 @@ protected:
     OK(VecDestroy(&y));
     LargeBody::TearDown();
   }
-  /* As the integrator makes a KSP that the user chooses; "" for ours */
+  /* Makes a KSP like the integrator; type: chosen by the user, "" for the default */
   void make(KSP *to, LinearChoice *of, const char type[], PetscReal rtol)
   {
     PC pc;
@@ -58,7 +59,7 @@ protected:
     EXPECT_TRUE(same);
     EXPECT_TRUE(usable);
   }
-  /* The next solve of both */
+  /* Compares the next solve of both */
   void expectSameSolve()
   {
     PetscBool equal = PETSC_FALSE;
@@ -76,12 +77,13 @@ protected:
 
 } // namespace
 
-/* What rounding of the products leaves is measured at the first solve with a matrix: later ones, which it would not suit, are not judged */
+/* Rounding errors of the products are measured at the first solve with a matrix; later solves, for which products
+   might be too inaccurate, are not tested again */
 TEST_F(SolverState, ProductsThatWereMeasured)
 {
   LinearChoice of;
   bar(40, 4, 4);
-  OK(VecSet(b, 1)); /* it bends: small forces of large ones */
+  OK(VecSet(b, 1)); /* bending: small forces as differences of large ones */
   first(KSPCG, 1e-2);
   EXPECT_GT(solve(), 0);
   EXPECT_NE(view().find("single precision"), std::string::npos) << view();
@@ -93,7 +95,7 @@ TEST_F(SolverState, ProductsThatWereMeasured)
   solver(KSPCG, 1e-4);
   EXPECT_GT(solve(), 0);
   EXPECT_NE(view().find("double precision"), std::string::npos) << "the test shows nothing";
-  /* into one that has fallen back */
+  /* into a solver that has already fallen back to double precision */
   Archive again;
   again.data    = archive.data;
   again.reading = true;
@@ -102,7 +104,8 @@ TEST_F(SolverState, ProductsThatWereMeasured)
   expectSameSolve();
 }
 
-/* Conjugate gradients that were given up are not tried again; a solver that has gone on with either takes the other one as well */
+/* Conjugate gradients that were given up are not tried again; a solver that has already used either solver can take
+   over the state of the other */
 TEST_F(SolverState, AFactorInPlaceOfConjugateGradients)
 {
   PetscBool    changed = PETSC_FALSE;
@@ -134,7 +137,7 @@ TEST_F(SolverState, AFactorInPlaceOfConjugateGradients)
   expectSameSolve();
 }
 
-/* Where there was no room for a factor there is none later, whatever the matrix becomes */
+/* If there was no memory for a factorization none is tried later, whatever the matrix */
 TEST_F(SolverState, WantOfRoom)
 {
   PetscBool    changed = PETSC_FALSE;
@@ -151,7 +154,7 @@ TEST_F(SolverState, WantOfRoom)
   EXPECT_TRUE(isConstraint());
 }
 
-/* A coarse matrix whose first values were not symmetric keeps the LU of the user's package */
+/* A coarse matrix that was unsymmetric at first keeps the LU of the package chosen by the user */
 TEST_F(SolverState, FactorizationOfTheCoarseLevel)
 {
   Vec          left;
@@ -174,7 +177,7 @@ TEST_F(SolverState, FactorizationOfTheCoarseLevel)
   OK(PetscOptionsClear(NULL));
 }
 
-/* Nodes that were found in other values are not found again, and nobody says that the bits are the same */
+/* Nodes that were detected with other values are not detected again, and equality of bits is not promised */
 TEST_F(SolverState, NodesOfOtherValues)
 {
   LinearChoice of;
@@ -198,7 +201,7 @@ TEST_F(SolverState, NodesOfOtherValues)
   EXPECT_GT(solve(), 0);
 }
 
-/* The user wishes otherwise now */
+/* The user has other options now */
 TEST_F(SolverState, OtherOptions)
 {
   bar(8, 4, 4);
@@ -219,7 +222,7 @@ TEST_F(SolverState, OtherOptions)
   }
 }
 
-/* Bytes that say something else, or end early: solved with what is taken, or said not to be usable */
+/* Damaged or truncated data: either accepted and usable for solving, or refused as not usable */
 TEST_F(SolverState, DamagedBytes)
 {
   PetscInt refused = 0, unusable = 0;
@@ -236,14 +239,14 @@ TEST_F(SolverState, DamagedBytes)
     LinearChoice of;
     archive      = Archive();
     archive.data = good;
-    const std::size_t at = below(k % 2 ? good.size() : std::min<std::size_t>(good.size(), 6000)); /* the division, and all */
+    const std::size_t at = below(k % 2 ? good.size() : std::min<std::size_t>(good.size(), 6000)); /* the part with the division into nodes, or anywhere */
     if (k % 8 == 0) archive.data.resize(at);
     else archive.data[at] = (char)(k % 3 ? archive.data[at] ^ (1 << below(8)) : (int)below(256));
     load(KSPCG, 1e-6, &of);
     refused += !same;
     if (usable) {
       OK(KSPSolve(other, b, x));
-    } else { /* set up anew it serves */
+    } else { /* after a new set-up it works */
       std::swap(ksp, other);
       OK(KSPSetOperators(ksp, A, A));
       EXPECT_GT(solve(), 0);

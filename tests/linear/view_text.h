@@ -1,4 +1,4 @@
-/* What a PETSc object prints of itself */
+/* The text that a PETSc object prints about itself */
 #ifndef HHTDAE_TEST_VIEW_TEXT_H
 #define HHTDAE_TEST_VIEW_TEXT_H
 
@@ -6,7 +6,7 @@
 #include <petscviewer.h>
 #include <string>
 
-/* view(viewer) prints it */
+/* view(viewer) prints the object */
 template <class View> std::string ViewText(View view, PetscViewerFormat format = PETSC_VIEWER_DEFAULT)
 {
   PetscViewer viewer;

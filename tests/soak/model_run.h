@@ -158,7 +158,7 @@ inline PetscErrorCode WatchRun(TS ts, PetscInt step, PetscReal t, Vec X, void *c
   }
   if (w.laws && (w.result.x.size() > before || step < 20)) PetscCall(JudgeLaws(w, ts, t));
   if (w.result.x.size() > before) PetscCall(Misfit(ts, t, &w.result));
-  if (step == w.settings.save_at && !w.settings.save.empty()) /* after the samples of the step, which the resumed run does not repeat: the file has their solver */
+  if (step == w.settings.save_at && !w.settings.save.empty()) /* after the samples of the step, which the resumed run does not repeat */
     PetscCall(TSHHT3CheckpointSave(ts, w.settings.save.c_str()));
   if (step % 16 == 0) {
     PetscInt         unknowns;
