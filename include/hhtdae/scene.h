@@ -11,9 +11,9 @@
     PetscCall(scene.solve(ts));
 
   Any consistent units may be used; angles are in radians. Building a scene never fails: all errors of the description are reported at once,
-  by name, as one PETSc error of setUp(), createTS() or solve(), whichever is called first. Only a user's function that throws when add()
-  tries it (a law of a spring, a motion in time) lets add() throw. Every rank describes the same scene in the same order; METIS distributes
-  the bodies over the ranks.
+  by name, as one PETSc error of setUp(), createTS() or solve(), whichever is called first. Exceptions of the user's own functions, those that
+  describe and those that add() tries (laws of springs, motions in time), pass through add(), marker(), markerAt() and gravity(), which then have
+  added nothing. Every rank describes the same scene in the same order; METIS distributes the bodies over the ranks.
 
   Messages and results identify things by name. Two bodies, elements (joints, motions and forces together), variables, states or channels
   with the same name are an error. An empty name becomes that of the kind (for an element: of its type) with the number among all of the
@@ -33,6 +33,7 @@
 #include "hhtdae/modal.h"
 #include "hhtdae/output.h"
 #include "hhtdae/types.h"
+#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -183,6 +184,7 @@ public:
   template <class Spec, std::enable_if_t<!is_description<Spec>, int> = 0> Element add(const std::string &name, const Spec &spec)
   {
     if (recording()) record([=](Scene &s) { s.enter(name, spec); });
+    const Attempt attempt(*this);
     return enter(name, spec);
   }
 
@@ -218,34 +220,34 @@ public:
   template <class F, std::enable_if_t<is_description<F>, int> = 0> auto add(const std::string &name, const F &describe)
   {
     if (recording()) record([=](Scene &s) { s.add(name, describe()); });
-    const Nested nested(*this);
+    const Attempt attempt(*this);
     return add(name, describe());
   }
   /* An element that may be missing: without a value it keeps its number among the elements, but does not act */
   template <class Spec> Element add(const std::string &name, const std::optional<Spec> &spec)
   {
     if (recording()) record([=](Scene &s) { s.add(name, spec); });
-    const Nested nested(*this);
+    const Attempt attempt(*this);
     return spec ? add(name, *spec) : absent(name);
   }
   template <class F, std::enable_if_t<is_description<F>, int> = 0> Marker marker(Body body, const F &describe, const std::string &name = "")
   {
     if (recording()) record([=](Scene &s) { s.marker(body, describe, name); });
-    const Nested nested(*this);
+    const Attempt attempt(*this);
     const Place p(describe());
     return marker(body, p.position, p.axes, name);
   }
   template <class F, std::enable_if_t<is_description<F>, int> = 0> Marker markerAt(Body body, const F &describe, const std::string &name = "")
   {
     if (recording()) record([=](Scene &s) { s.markerAt(body, describe, name); });
-    const Nested nested(*this);
+    const Attempt attempt(*this);
     const Place p(describe());
     return markerAt(body, p.position, p.axes, name);
   }
   template <class F, std::enable_if_t<is_description<F>, int> = 0> void gravity(const F &describe)
   {
     if (recording()) record([=](Scene &s) { s.gravity(describe); });
-    const Nested nested(*this);
+    const Attempt attempt(*this);
     gravity(Vector3(describe()));
   }
 
@@ -296,6 +298,20 @@ private:
     explicit Nested(Scene &s) : scene(s) { scene.nested_++; }
     ~Nested() { scene.nested_--; }
   };
+  class Attempt /* guards a call that has just been recorded: if a user's function throws in it, the scene is set back to its state before */
+  {
+  public:
+    explicit Attempt(Scene &s) : noted_(s.recording()), exceptions_(std::uncaught_exceptions()), nested_(s) {}
+    ~Attempt()
+    {
+      if (noted_ && std::uncaught_exceptions() > exceptions_) nested_.scene.takeBack();
+    }
+
+  private:
+    const bool   noted_;
+    const int    exceptions_;
+    const Nested nested_;
+  };
 
   PetscInt                 number_; /* of this scene: `scene` of its handles */
   std::shared_ptr<Model>   model_;
@@ -307,12 +323,14 @@ private:
   template <class Spec> Element enter(const std::string &name, const Spec &spec);
   bool       recording() const { return journal_ && !nested_; }
   void       record(std::function<void(Scene &)> call);
+  void       takeBack(); /* the call that was recorded last */
   SceneData &data() const;
   Element    absent(const std::string &name);
   Body       addRigid(const std::string &name, const RigidBody &body);
   Body       frameAt(Body flexible, PetscInt place);
   Body       addFrame(Body flexible, PetscInt place);
   void       describeAnew();
+  void       repeatCalls();
 };
 
 } // namespace hhtdae

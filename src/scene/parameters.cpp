@@ -10,12 +10,35 @@ namespace
 
 std::size_t Handles(const SceneData &s) { return s.markers.size() + s.bodies.size(); }
 
+/* What calls add to */
+std::size_t Entries(const SceneData &s)
+{
+  std::size_t parts = 0;
+  for (const StoreBase *store : s.order) parts += (std::size_t)store->size();
+  return Handles(s) + s.elements.size() + s.variables.size() + s.states.size() + s.extensions.size() + s.channels.size() + s.shapes.size() + s.lines.size() + s.errors.size() + parts;
+}
+
 } // namespace
 
 void Scene::record(std::function<void(Scene &)> call)
 {
   journal_->calls.push_back(std::move(call));
   journal_->before.push_back(Handles(data()));
+  journal_->entries = Entries(data());
+}
+
+/* The calls that describe are as many as before, and so is what they have added, except what a function has added before it threw: for that all is described anew. This runs
+   while the exception is on its way; a description that fails here will fail in the next set-up. */
+void Scene::takeBack()
+{
+  journal_->calls.pop_back();
+  journal_->before.pop_back();
+  if (Entries(data()) == journal_->entries) return;
+  journal_->stale = true;
+  try {
+    describeAnew();
+  } catch (...) {
+  }
 }
 
 Parameter Scene::parameter(const std::string &name, double value)
@@ -49,7 +72,22 @@ PetscErrorCode Scene::set(const std::string &name, double value)
   PetscFunctionReturn(0);
 }
 
-/* Repeats the recorded calls with a new model; existing runs keep the old one */
+/* A function that makes other markers than at first is an error, after which nothing else is described */
+void Scene::repeatCalls()
+{
+  SceneData   &s = data();
+  const Nested nested(*this);
+  for (std::size_t k = 0; k < journal_->calls.size(); k++) {
+    const std::size_t first = s.elements.size(), errors = s.errors.size();
+    journal_->calls[k](*this);
+    if (k + 1 == journal_->calls.size() || Handles(s) == journal_->before[k + 1] || s.errors.size() > errors) continue;
+    s.errors.push_back((first < s.elements.size() ? s.elements.back().name : "what is described by a function") +
+                       ": its function makes other markers or attachments than at first, so that the handles of all later ones would stand for others; make them outside of it");
+    break;
+  }
+}
+
+/* Repeats the recorded calls with a new model; existing runs keep the old one, and so does the scene if a function throws */
 void Scene::describeAnew()
 {
   if (!journal_->stale) return;
@@ -63,14 +101,11 @@ void Scene::describeAnew()
   s.parameters    = data().parameters;
   for (ParameterData &p : s.parameters) p.described = *p.present;
   model_.swap(next);
-  const Nested nested(*this);
-  for (std::size_t k = 0; k < journal_->calls.size(); k++) {
-    const std::size_t first = s.elements.size(), errors = s.errors.size();
-    journal_->calls[k](*this);
-    if (k + 1 == journal_->calls.size() || Handles(s) == journal_->before[k + 1] || s.errors.size() > errors) continue;
-    s.errors.push_back((first < s.elements.size() ? s.elements.back().name : "what is described by a function") +
-                       ": its function makes other markers or attachments than at first, so that the handles of all later ones would stand for others; make them outside of it");
-    break;
+  try {
+    repeatCalls();
+  } catch (...) {
+    model_.swap(next);
+    throw;
   }
   journal_->stale = false;
 }

@@ -3,6 +3,7 @@
 #include "hhtdae/query.h"
 #include "scene_output.h"
 #include <cmath>
+#include <stdexcept>
 
 using namespace hhtest;
 
@@ -316,6 +317,65 @@ TEST(Parameters, SayWhatIsWrong)
   late.parameter("k", 1);
   EXPECT_NE(late.setUp(), 0);
   EXPECT_TRUE(trap.says("parameter k: it came too late")) << trap.message;
+}
+
+/* A function that throws has added nothing, also when what came before and after it is described with other parameters; its exception comes as it is */
+TEST(Parameters, AFunctionThatThrowsAddsNothing)
+{
+  const auto fails = [](const std::function<void()> &call) { EXPECT_THROW(call(), std::range_error); };
+  const auto no    = [](auto what) { return [=]() -> decltype(what) { throw std::range_error("off the table"); }; };
+  Block      b;
+  Scene     &s = b.scene;
+  fails([&] { s.add("rigid", no(RigidBody())); });
+  fails([&] { s.add("point", no(PointMass())); });
+  fails([&] { s.add("element", no(SpringDamper())); });
+  fails([&] { s.add("maybe", no(std::optional<SpringDamper>())); });
+  fails([&] { s.marker(b.block, no(Vector3())); });
+  fails([&] { s.markerAt(b.block, no(Vector3())); });
+  fails([&] { s.gravity(no(Vector3())); });
+  fails([&] { s.add("law", NonlinearSpring{b.on, b.at, [](Real, Real) -> Real { throw std::range_error("no such law"); }}); });
+  fails([&] {
+    s.add("with markers", [&, i = b.block]() -> SpringDamper {
+      s.add("half", SpringDamper{s.marker(i), s.marker(s.ground(), {0, 0, 3}), 1});
+      throw std::range_error("half way");
+    });
+  });
+  const Marker top = s.marker(s.ground(), {0, 0, 5});
+  s.channel("top", Measure::distance(b.on, top), "m");
+  for (double k : {100., 400.}) {
+    must(s.set("stiffness", k));
+    SceneRun            run(s, 0.3, tolerance(1e-9));
+    std::vector<double> x;
+    must(run.solve());
+    must(s.sample(run.ts, 0.3, x));
+    EXPECT_NEAR(x[0], sine(k, 1, 0.3), 1e-5);
+    EXPECT_NEAR(x[2], 5 - x[0], 1e-9);
+  }
+}
+
+/* What is described after a description that has failed has the places that it has without that */
+TEST(Parameters, AFailedDescriptionLeavesTheLastOne)
+{
+  Block     b;
+  ErrorTrap trap;
+  Scene    &s = b.scene;
+  s.add("late", [i = b.on, j = b.at, m = b.mass] {
+    if (m > 5) throw std::range_error("too heavy");
+    return SpringDamper{i, j, 0};
+  });
+  const Marker low = s.marker(s.ground(), {0, 0, -7});
+  must(s.set("mass", 6));
+  EXPECT_NE(s.setUp(), 0);
+  EXPECT_TRUE(trap.says("too heavy")) << trap.message;
+  s.channel("top", Measure::distance(b.on, s.marker(s.ground(), {0, 0, 5})), "m");
+  s.channel("low", Measure::distance(b.on, low), "m");
+  must(s.set("mass", 1));
+  SceneRun            run(s, 0.3, tolerance(1e-9));
+  std::vector<double> x;
+  must(run.solve());
+  must(s.sample(run.ts, 0.3, x));
+  EXPECT_NEAR(x[2], 5 - x[0], 1e-9);
+  EXPECT_NEAR(x[3], 7 + x[0], 1e-9);
 }
 
 /* A checkpoint can be resumed only with the parameter values with which it was written, both of elements and of
