@@ -289,3 +289,31 @@ TEST(Mesh, WhatCannotBe)
     s.add("m", GearMesh{i1, j1, i2, j2, Marker{}});
   });
 }
+
+/* A marker off the axis on which its wheel turns would give another ratio than that of the wheels: 1.490 or 1.24 in place of 1.5, by where it is */
+TEST(Mesh, WheelsTurnOnTheirAxes)
+{
+  const Vector3 P1(0, 0, 0), P2(.5, 0, 0), off(.05, .02, 0), along(0, 0, .3);
+  const auto    says = [&](const Vector3 &i, const Vector3 &j) {
+    Scene     s(PETSC_COMM_SELF);
+    RigidBody b;
+    const Body one = s.add("one", b);
+    b.position     = P2;
+    const Body   two = s.add("two", b);
+    const Marker i1 = s.markerAt(one, P1), j1 = s.marker(s.ground(), P1), i2 = s.markerAt(two, P2), j2 = s.marker(s.ground(), P2);
+    s.add("first", Revolute{i1, j1});
+    s.add("second", Revolute{i2, j2});
+    s.add("teeth", GearMesh{i == P1 ? i1 : s.markerAt(one, i), j == P1 ? j1 : s.marker(s.ground(), j), i2, j2, s.marker(s.ground(), {.3, 0, 0}, hhtest::axesAlong(Vector3(0, 1, 0)))});
+    ErrorTrap error;
+    return s.setUp() ? error.message : std::string();
+  };
+  EXPECT_EQ(says(P1, P1), "");
+  EXPECT_EQ(says(P1 + along, P1), "");
+  EXPECT_EQ(says(P1, P1 - along), "");
+  for (const Vector3 &j : {P1, Vector3(P1 + along)}) {
+    const std::string error = says(P1 + off, j);
+    EXPECT_NE(error.find("gear mesh teeth: wheel 1: marker i1 is 0.0538516 off the axis, z of marker j1"), std::string::npos) << error;
+  }
+  const std::string error = says(P1 + off, P1 + off);
+  EXPECT_NE(error.find("gear mesh teeth: wheel 1: z of marker j1 is not the axis of first, on which it turns"), std::string::npos) << error;
+}

@@ -1,6 +1,7 @@
 /* Gears and racks between two bodies on one carrier; the tooth force acts at the pitch point. */
 #include "scene/kernels/mesh.h"
 #include "scene/motions/moving_pair.h"
+#include <algorithm>
 
 namespace hhtdae
 {
@@ -37,6 +38,34 @@ void CheckWheel(ElementBuilder &e, Marker i, Marker j, const char *which)
   e.require(a.cross(b).norm() < parallel_sine, std::string(which) + ": the z axes of its markers are not parallel, as those of a revolute or cylindrical joint are");
 }
 
+/* Distance of a point from a marker's z axis */
+double OffAxis(const Vector3 &x, const Frame<double> &j)
+{
+  const Vector3 u = x - j.x;
+  return (u - u.dot(j.R.col(2)) * j.R.col(2)).norm();
+}
+
+/* Rotations are about z_j through the origin of j: a wheel's marker off that axis, or an axis that is not the joint's, would be teeth on a wheel that wobbles */
+void CheckAxis(ElementBuilder &e, Marker i, Marker j, double lever, int number)
+{
+  const std::string   which = "wheel " + std::to_string(number);
+  const SceneData    &s     = e.scene();
+  const Frame<double> at    = e.frame(j);
+  const double        most  = parallel_sine * std::abs(lever);
+  const auto          body  = [&](Marker m) { return s.markers[m.id].body; };
+  std::string         other;
+  e.require(OffAxis(e.frame(i).x, at) <= most, which + ": marker i" + std::to_string(number) + " is " + Show(OffAxis(e.frame(i).x, at)) + " off the axis, z of marker j" + std::to_string(number) +
+                                                   "; give the markers of the wheel's joint");
+  for (const ElementData &joint : s.elements) {
+    const bool turns = joint.type == std::string("revolute") || joint.type == std::string("cylindrical");
+    if (!turns || !s.valid(joint.i) || !s.valid(joint.j) || std::minmax(body(joint.i), body(joint.j)) != std::minmax(body(i), body(j))) continue;
+    const Frame<double> axis = s.frame(joint.j);
+    if (OffAxis(at.x, axis) <= most && at.R.col(2).cross(axis.R.col(2)).norm() < parallel_sine) return;
+    other = joint.name;
+  }
+  e.require(other.empty(), which + ": z of marker j" + std::to_string(number) + " is not the axis of " + other + ", on which it turns; give the markers of that joint");
+}
+
 template <class K> void CheckLever(ElementBuilder &e, const typename K::Data &d, int k, const char *which)
 {
   e.require(std::abs(K::perAngle(d, k)) > parallel_sine * d.side[k].bearing.norm(),
@@ -58,6 +87,8 @@ template <bool Rack, class Spec> Element Mesh(ElementBuilder &e, const Spec &s)
   CheckLever<K>(e, d, 0, "wheel 1");
   if (!Rack) CheckLever<K>(e, d, 1, "wheel 2");
   else e.require(std::abs(K::perAdvance(d, e.planar() ? 0 : 2)) > parallel_sine, "rack: the force of the teeth is across its way, z of j2 (planar: x)");
+  if (e.good()) CheckAxis(e, s.i1, s.j1, K::perAngle(d, 0), 1);
+  if (e.good() && !Rack) CheckAxis(e, s.i2, s.j2, K::perAngle(d, 1), 2);
   if (e.good()) e.constrain<K>({s.i1, s.i2, s.mesh}, d);
   return e.done();
 }
