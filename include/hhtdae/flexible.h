@@ -122,7 +122,7 @@ struct Reduction {
   Method   method = Method::CraigBampton;
   PetscInt modes  = 20;     /* largest number of normal modes; PETSC_DEFAULT: all below max_frequency */
   double   max_frequency = 0;      /* highest frequency of normal modes, cycles per unit of time; 0: no bound */
-  double   keep_below    = 0;      /* modes of the reduced pair (K, M) below this frequency are kept; 0: all */
+  double   keep_below    = 0;      /* modes of the reduced pair (K, M) below this frequency are kept; 0: all. If bounds leave no modes, a notice says so */
   std::vector<PetscInt> keep;      /* numbers (from 0) of the modes of the reduced pair that are kept; empty: all */
   bool     stiffening = false;     /* geometric stiffening by loads on attachments and by angular velocity; needs elements and an attachment */
   std::vector<std::string> node_sets; /* nodes of these sets are kept for markers, forces and contact */

@@ -20,9 +20,11 @@ struct ReductionSpace {
   MatrixXd x;                  /* own dofs x vectors */
   MatrixXd motion;             /* motions of the attachments: 6 rows each, on all ranks; rows of averages are not set */
   bool     holds_rigid = true; /* the space contains the rigid-body motions; else it is orthogonal to them */
+  PetscInt normal      = 0;    /* vectors that are normal modes */
 
   /* Modes of the reduced matrices, x Y and motion Y; the same on all ranks */
-  PetscInt elastic = 0;      /* number of elastic modes; those that are kept have: */
+  PetscInt elastic = 0;      /* number of elastic modes */
+  double   lowest  = 0;      /* their lowest eigenvalue. Those that are kept have: */
   VectorXd lambda, residual; /* eigenvalues, and residuals by ModeResiduals() */
   MatrixXd Y;
 };

@@ -38,6 +38,7 @@ PetscErrorCode CutModes(const FeModel &model, const BodyScales &scales, const No
   PetscInt       from = modes.wanted, to = modes.wanted;
 
   PetscFunctionBegin;
+  space->normal = modes.wanted;
   if (from == n) PetscFunctionReturn(0);
   while (from > 0 && EqualFrequencies(modes.lambda[from - 1], modes.lambda[from])) from--;
   while (to < n && EqualFrequencies(modes.lambda[to - 1 < from ? from : to - 1], modes.lambda[to])) to++;

@@ -188,6 +188,22 @@ static PetscErrorCode ToModes(const FeModel &model, const std::vector<Tied> &tie
   PetscFunctionReturn(0);
 }
 
+/* A notice where bounds on frequencies, or attachments, leave fewer kinds of modes than were asked for; it may be a mistake in units */
+static PetscErrorCode TellOfMissingModes(const FeModel &model, const Reduction &r, Method method, const ReductionSpace &space)
+{
+  const char *left = space.lambda.size() ? "the body has constraint modes alone" : "the body is rigid";
+
+  PetscFunctionBegin;
+  if (space.elastic && !space.lambda.size())
+    PetscCall(PetscPrintf(model.comm, "reduce: keep_below = %g leaves none of %" PetscInt_FMT " modes, the slowest of which has the frequency %g: %s\n", r.keep_below,
+                          space.elastic, std::sqrt(space.lowest) / (2 * PETSC_PI), left));
+  else if (method != Method::Static && r.modes != 0 && r.max_frequency > 0 && !space.normal)
+    PetscCall(PetscPrintf(model.comm, "reduce: no normal mode has a frequency below max_frequency = %g: %s\n", r.max_frequency, left));
+  else if (method == Method::Static && !space.elastic)
+    PetscCall(PetscPrintf(model.comm, "reduce: constraint modes of fewer than two attachments are rigid motions: %s\n", left));
+  PetscFunctionReturn(0);
+}
+
 static void FillModes(const ReductionSpace &space, ReducedBody *body)
 {
   const PetscInt n = (PetscInt)space.lambda.size();
@@ -241,6 +257,7 @@ PetscErrorCode Reduce(const FeModel &model, const Reduction &reduction, ReducedB
   PetscCall(CheckModel(model, reduction, &tied, &kept, &loads, &scales));
   PetscCall(FindSpace(model, tied, reduction, scales, &method, &space));
   PetscCall(ToModes(model, tied, reduction, scales, &space));
+  PetscCall(TellOfMissingModes(model, reduction, method, space));
 
   PetscCall(phase.begin("invariants"));
   FillModes(space, body);

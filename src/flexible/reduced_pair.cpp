@@ -156,6 +156,7 @@ PetscErrorCode SolveSpace(const FeModel &model, const Reduction &reduction, cons
   PetscCall(FixEqualFrequencies(model, scales, *space, lambda, kept, &Y));
   const PetscInt n = (PetscInt)kept.size();
   space->elastic   = (PetscInt)lambda.size();
+  space->lowest    = space->elastic ? lambda[0] : 0;
   space->lambda.resize(n);
   space->Y.resize(space->x.cols(), n);
   for (PetscInt k = 0; k < n; k++) {

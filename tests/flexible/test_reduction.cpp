@@ -124,9 +124,47 @@ TEST(Reduction, Selection)
   must(Reduce(m.model, r, &some));
   EXPECT_EQ(some.modal.modes(), 5);
   EXPECT_NEAR(some.elastic_scale, std::pow(some.modal.omega[4], 2), 1e-9 * some.elastic_scale);
-  r.keep_below = 1e-3;
-  must(Reduce(m.model, r, &some)); /* no mode left: a rigid body */
-  EXPECT_EQ(some.modal.modes(), 0);
+}
+
+/* A bound that leaves no modes gives a rigid body, or one of constraint modes, and a notice; to ask for none is none */
+TEST(Reduction, NoticesOfMissingModes)
+{
+  Made        m(bar());
+  ReducedBody body;
+  const auto  notice = [&](const Reduction &r) {
+    testing::internal::CaptureStdout();
+    const PetscErrorCode failed = Reduce(m.model, r, &body);
+    const std::string    text   = testing::internal::GetCapturedStdout();
+    must(failed);
+    return text;
+  };
+  Reduction r = both(6);
+  EXPECT_EQ(notice(r), "");
+  const double slowest = body.mode[0].frequency;
+  r.keep_below         = 1e-3;
+  const std::string none = notice(r);
+  EXPECT_EQ(body.modal.modes(), 0);
+  EXPECT_NE(none.find("keep_below = 0.001 leaves none of 12 modes"), std::string::npos) << none;
+  char number[32];
+  snprintf(number, sizeof number, "%g: the body is rigid", slowest);
+  EXPECT_NE(none.find(number), std::string::npos) << none;
+  r               = both(6);
+  r.max_frequency = 1e-3;
+  for (PetscInt modes : {(PetscInt)6, (PetscInt)PETSC_DEFAULT}) {
+    r.modes = modes;
+    EXPECT_EQ(notice(r), "reduce: no normal mode has a frequency below max_frequency = 0.001: the body has constraint modes alone\n");
+    EXPECT_EQ(body.modal.modes(), 6);
+  }
+  r.attachments.pop_back();
+  EXPECT_EQ(notice(r), "reduce: no normal mode has a frequency below max_frequency = 0.001: the body is rigid\n");
+  r.method = Method::Static;
+  EXPECT_EQ(notice(r), "reduce: constraint modes of fewer than two attachments are rigid motions: the body is rigid\n");
+  r        = both(0);
+  r.method = Method::CraigBampton;
+  EXPECT_EQ(notice(r), "");
+  r.attachments.pop_back();
+  EXPECT_EQ(notice(r), "");
+  EXPECT_EQ(body.modal.modes(), 0);
 }
 
 TEST(Reduction, NodesAreLeftOut)

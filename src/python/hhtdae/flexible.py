@@ -343,7 +343,7 @@ def reduce(model, attachments, *, method="craig_bampton", modes: Optional[int] =
     max_frequency : float
         Largest frequency of normal modes, cycles per unit of time; 0: no bound.
     keep_below : float
-        Modes of the reduced eigenvalue problem up to this frequency are kept; 0: all.
+        Modes of the reduced eigenvalue problem up to this frequency are kept; 0: all. If bounds leave no modes, a notice says so.
     keep : sequence of int
         Numbers, from 0 on, of the modes of the reduced eigenvalue problem that are kept; empty: all.
     stiffening : bool
