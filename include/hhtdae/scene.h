@@ -212,8 +212,8 @@ public:
     Then the whole scene is described anew in the same order, so that values derived from the description, such as lengths at the start, are
     right. Markers of an element that may be missing must be made outside of its function: markers other than at first are an error. Runs
     made before keep their values. A function of the state (in an Expression, for example) that holds a Parameter reads the present value
-    at every evaluation, so that a controller may change it between steps; after a jump call TSRestartStep(). A checkpoint can only be
-    loaded with the parameter values it was written with; otherwise an error names the parameter.
+    at every evaluation, so that a controller may change it between steps; after a jump call TSRestartStep(), as solve() does by itself if
+    parameters have been set since it ended last. A checkpoint can only be loaded with the parameter values it was written with; otherwise an error names the parameter.
   */
   Parameter      parameter(const std::string &name, double value);
   PetscErrorCode set(const std::string &parameter, double value);
@@ -281,7 +281,8 @@ public:
      unless it prescribes accelerations. Result files are overwritten: give the run other names, or its TS a prefix. */
   PetscErrorCode createTS(TS *ts, TS from);
 
-  /* TSSolve() with output of the results. */
+  /* TSSolve() with output of the results. If parameters have been set since it ended last, it begins anew from consistent accelerations. A
+     motion or constraint of positions that has jumped is then an error; with -ts_hhtdae_start project the positions are moved to the nearest ones that meet it. */
   PetscErrorCode solve(TS ts);
 
   /* Values of all channels, in the order of their definition, on every rank: at time t within the last step, after scene.solve() or in a

@@ -290,6 +290,7 @@ struct Integrator : StepState {
   /* the error test: weights 1/max(atol, rtol Y) with running maxima Y, zero for unknowns that do not enter */
   Vec       ymax = nullptr, weight = nullptr;
   PetscBool        own_start   = PETSC_FALSE; /* the present start is from values that the integrator has computed, not from the user's */
+  PetscBool        was_changed = PETSC_FALSE; /* the application has changed what forces and constraints depend on since the last step, NoteChange() */
   PetscBool        of_vectors  = PETSC_FALSE; /* of_id and of_state are set: the vectors of tolerances from which the weights were made */
   PetscObjectId    of_id[2]    = {};
   PetscObjectState of_state[2] = {};

@@ -237,10 +237,10 @@ PetscErrorCode StateOfStart(TS ts, PetscReal t, Vec state[3], TS *copy)
 namespace
 {
 
-/* Whether parameters have changed since the last step on any rank; all ranks have to take the same branch */
-PetscErrorCode ParametersChanged(const Runtime &R, PetscBool *changed)
+/* Whether parameters are others than `before` on any rank; all ranks have to take the same branch */
+PetscErrorCode ParametersChanged(const Runtime &R, const std::vector<double> &before, PetscBool *changed)
 {
-  PetscMPIInt other = R.step_parameters != ParametersNow(R.scene);
+  PetscMPIInt other = before != ParametersNow(R.scene);
   PetscFunctionBegin;
   if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &other, 1, MPI_INT, MPI_MAX, R.scene.comm));
   *changed = other ? PETSC_TRUE : PETSC_FALSE;
@@ -253,7 +253,7 @@ PetscErrorCode PresentState(TS ts, Vec state[3], PetscBool *done)
   PetscBool changed;
   PetscErrorCode (*evaluate)(TS, PetscBool, Vec, Vec, Vec, PetscBool *);
   PetscFunctionBegin;
-  PetscCall(ParametersChanged(R, &changed));
+  PetscCall(ParametersChanged(R, R.step_parameters, &changed));
   PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3EvaluatePresent_C", &evaluate));
   PetscCall(evaluate(ts, changed, state[0], state[1], state[2], done));
   PetscFunctionReturn(0);
@@ -278,6 +278,25 @@ PetscErrorCode StateOfOtherType(TS ts, PetscReal t, Vec state[3])
 }
 
 } // namespace
+
+/* Formulas that read a parameter jump with it, and so may forces and motions: the steps before say nothing of those after it */
+PetscErrorCode RestartAfterChange(Runtime &R, TS ts)
+{
+  PetscInt  steps;
+  PetscBool changed;
+  PetscErrorCode (*note)(TS);
+  PetscFunctionBegin;
+  PetscCall(TSGetStepNumber(ts, &steps));
+  if (!steps || R.start_parameters.empty()) PetscFunctionReturn(0);
+  PetscCall(ParametersChanged(R, R.start_parameters, &changed));
+  if (!changed) PetscFunctionReturn(0);
+  PetscCall(PetscInfo(ts, "scene: parameters have been changed since the end of the last solve(): restart\n"));
+  PetscCall(TSRestartStep(ts));
+  PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3NoteChange_C", &note));
+  if (note) PetscCall(note(ts));
+  R.start_parameters = ParametersNow(R.scene);
+  PetscFunctionReturn(0);
+}
 
 PetscErrorCode StateAt(TS ts, PetscReal t, bool from_equations, Vec state[3], TS *copy)
 {

@@ -246,7 +246,7 @@ PetscErrorCode ReadKept(Runtime &R, const double *x)
   PetscCheck(digest[0] == x[0] && digest[1] == x[1], R.scene.comm, PETSC_ERR_FILE_UNEXPECTED,
              "The checkpoint belongs to another scene: bodies, markers, gravity or the elements and what they connect are not the same");
   PetscCall(ResumeOutput(R, x + 2));
-  R.step_parameters = ParametersNow(R.scene);
+  R.step_parameters = R.start_parameters = ParametersNow(R.scene);
   if (x[checkpoint_numbers - 1] != 0) R.step_parameters.clear(); /* a parameter had been changed between the last step and the checkpoint */
   PetscFunctionReturn(0);
 }

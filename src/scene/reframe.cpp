@@ -11,6 +11,7 @@
   body, the memories of the elements, and the numbers of kept.cpp.
 */
 #include "runtime.h"
+#include "start.h"
 
 namespace hhtdae
 {
@@ -250,12 +251,13 @@ PetscErrorCode RotationVectors(Runtime &R, TS ts, IS *is)
   PetscFunctionReturn(0);
 }
 
-/* Completes the vector before a checkpoint is written */
+/* Completes the vector before a checkpoint is written; a restart that is due is in the file, too */
 PetscErrorCode PrepareCheckpoint(TS ts)
 {
   void *ctx;
   PetscFunctionBegin;
   PetscCall(TSGetI2Function(ts, nullptr, nullptr, &ctx));
+  PetscCall(RestartAfterChange(*static_cast<Runtime *>(ctx), ts));
   PetscCall(WriteKept(*static_cast<Runtime *>(ctx)));
   PetscFunctionReturn(0);
 }
@@ -297,6 +299,7 @@ PetscErrorCode Remember(Runtime &R, Vec U, Vec V)
   const double *u;
   PetscFunctionBegin;
   R.accepted_states++;
+  R.start_parameters.clear();
   R.step_parameters = ParametersNow(R.scene);
   if (!R.has_memory && R.queried_angles.empty()) PetscFunctionReturn(0);
   PetscCall(MoveBodies(R, U, V));

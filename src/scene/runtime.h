@@ -62,7 +62,7 @@ struct Runtime {
   /* State before the first step, if an analysis (hhtdae/analyses.h) has computed it: u, u', u'' with accelerations and multipliers, and its time */
   Vec       start_state[3] = {};
   PetscReal start_time     = 0;
-  std::vector<double>   start_parameters;                        /* values of the scene's parameters at that time */
+  std::vector<double>   start_parameters;                        /* values of the scene's parameters at that time; after Scene::solve() those at its end; empty while the run is under way */
   std::vector<double>   step_parameters;                         /* values of the scene's parameters at the beginning of the last step */
   PetscReal           accepted = PETSC_NINFINITY;         /* time of the accepted state to which axes and memories belong */
   bool                  steps_limited = false;                   /* whether an element on any rank limits the step size */

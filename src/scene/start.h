@@ -17,6 +17,7 @@ struct Runtime;
 /* kept.cpp: an error that names the ranks whose description differs from that of rank 0. Collective; called before any
    other collective work on the description */
 PetscErrorCode CompareDescriptions(const SceneData &s, PetscMPIInt size);
+PetscErrorCode RestartAfterChange(Runtime &R, TS ts);                           /* continue.cpp: where parameters have been set since the end of the last Scene::solve() */
 PetscErrorCode CheckSame(const Runtime &R, TS ts);                              /* an error if time, final time or tolerances of a run differ between ranks */
 PetscErrorCode ViewScene(const Model &M, const Runtime *R, PetscViewer viewer); /* view.cpp; R: a run of it, or null */
 

@@ -246,12 +246,19 @@ PetscErrorCode CreateRun(std::shared_ptr<const Model> model, TS *ts)
 PetscErrorCode Scene::solve(TS ts)
 {
   Runtime *R;
+  PetscInt steps;
   PetscFunctionBegin;
   PetscCall(FindRun(*this, ts, "Scene::solve()", &R));
   PetscCall(CheckSame(*R, ts));
+  PetscCall(ReadCheckpoint(ts));
+  PetscCall(RestartAfterChange(*R, ts));
+  PetscCall(TSGetStepNumber(ts, &steps));
+  if (steps) R->start_parameters.clear(); /* within the run callers restart it or not */
   PetscCall(AttachOutput(*R, output_, ts));
   PetscCall(OutputIsAttached(ts));
   const PetscErrorCode failed = SolveWithFinalTime(ts);
+  PetscCall(TSGetStepNumber(ts, &steps));
+  if (steps) R->start_parameters = ParametersNow(R->scene);
   /* After a failure the output sampled so far is written on one rank only: with several ranks, some may not have failed,
      and a collective call would wait forever */
   if (!failed || R->size == 1) PetscCall(FinishOutput(*R));

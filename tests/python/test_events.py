@@ -318,7 +318,6 @@ class Outputs(unittest.TestCase):
                     for k in range(10):
                         run.solve(0.05 * (k + 1))
                         p.set(0.1 * (k + 1))
-                        run.restart()
                     expected = 0.9
                 else:
                     def jump(r):

@@ -231,11 +231,37 @@ TEST(Parameters, AFunctionReadsThePresentValue)
   must(scene.sample(run.ts, 1, x));
   EXPECT_NEAR(x[0], 0, 1e-12);
   must(scene.set("push", 3));
-  must(TSRestartStep(run.ts));
   must(TSSetMaxTime(run.ts, 1.5));
   must(run.solve());
   must(scene.sample(run.ts, 1.5, x));
   EXPECT_NEAR(x[0], 1.5, 1e-9);
+}
+
+/* A motion that jumps between two parts of a run, whose steps it has met until then: solve() begins anew, and names it before a step is made */
+TEST(Parameters, AMotionThatJumps)
+{
+  Scene           scene(PETSC_COMM_SELF, Space::Planar);
+  const Parameter speed = scene.parameter("speed", 10);
+  RigidBody       disc;
+  disc.angular_velocity = {0, 0, 10};
+  const Body   body     = scene.add("disc", disc);
+  const Marker i = scene.marker(body), j = scene.marker(scene.ground());
+  scene.add("pin", Revolute{i, j});
+  scene.add("drive", RotationalMotion{i, j, TimeFunction::formula([=](const TimeFunction::Number &t) { return speed.value() * t; })});
+  SceneRun run(scene, 10, tolerance(1e-6));
+  PetscInt before, after;
+  must(run.solve());
+  must(TSGetStepNumber(run.ts, &before));
+  must(scene.set("speed", 10.1));
+  must(TSSetMaxTime(run.ts, 10.5));
+  {
+    ErrorTrap trap;
+    EXPECT_NE(run.solve(), 0);
+    EXPECT_TRUE(trap.says("At t = 10. the positions violate the constraints, which have been changed")) << trap.message;
+    EXPECT_TRUE(trap.says("drive")) << trap.message;
+  }
+  must(TSGetStepNumber(run.ts, &after));
+  EXPECT_EQ(after, before);
 }
 
 /* Forces, accelerations and reactions at the present time, after parameters or velocities have been changed since the

@@ -104,6 +104,24 @@ PetscErrorCode ReportInconsistency(TS ts, const char *what, const char *unit, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Tolerances by which positions that a step has left may miss constraints that have jumped: the first step goes on from 2 and less, and none from 5 and more */
+constexpr PetscReal largest_jump = 4;
+
+/* An error where a constraint has jumped and is not to be followed by projecting the positions (Parameters.AMotionThatJumps) */
+PetscErrorCode RefuseJump(TS ts, PetscReal e, PetscInt row, PetscReal value)
+{
+  const Integrator &I = Get(ts);
+  RowLabel          label;
+
+  PetscFunctionBegin;
+  if (e <= largest_jump || !I.own_start || !I.was_changed || I.start_policy != TSHHT3_START_REPORT) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(LabelRow(ts, row, &label));
+  SETERRQ(PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONG,
+          "At t = %g the positions violate the constraints, which have been changed since the last step: the nearest consistent ones are %.3g tolerances away; the largest violation is %.3g, in row %s. "
+          "Constraints and motions of displacements must not jump, or -ts_hhtdae_start project, TSHHT3SetStart(), moves the positions.",
+          (double)ts->ptime, (double)e, (double)value, label.text);
+}
+
 PetscErrorCode CheckPositions(TS ts, PetscBool *current)
 {
   Integrator     &I = Get(ts);
@@ -117,6 +135,7 @@ PetscErrorCode CheckPositions(TS ts, PetscBool *current)
     last = e;
     PetscCall(MissOfPositions(ts, &e));
     PetscCall(WorstRow(ts, I.work, &row, &value));
+    if (it == 0) PetscCall(RefuseJump(ts, e, row, value));
     if (it == 0) PetscCall(ReportInconsistency(ts, "positions", "", e, row, value, project));
     *current = PETSC_TRUE;
     if (!project || e == 0 || e >= 0.5 * last) break;
@@ -270,6 +289,13 @@ PetscErrorCode ProjectState(TS ts, Prepared *prepared)
   if (e < 1) PetscCall(SubtractCoordinates(I, I.U0, I.X));
   PetscCall(CheckVelocities(ts, true, prepared, &e, &row, &value));
   PetscCall(PetscInfo(ts, "velocities moved by %g of the tolerance\n", (double)e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode NoteChange(TS ts)
+{
+  PetscFunctionBegin;
+  Get(ts).was_changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

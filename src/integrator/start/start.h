@@ -51,6 +51,9 @@ PetscErrorCode ChooseFirstStep(TS ts, Vec rate);
 /* The local error that a step of length h from there leaves by these rates, in units of the tolerance */
 PetscErrorCode ErrorOfStart(TS ts, Vec rate, PetscReal h, PetscReal *e);
 
+/* For the restart that comes next: the application has changed what forces and constraints depend on */
+PetscErrorCode NoteChange(TS ts);
+
 /* Measures, reports and by choice mends U0, V0. Of what the start needs of the final ones, `prepared` says what has been made. */
 PetscErrorCode CheckInitialState(TS ts, Prepared *prepared);
 

@@ -130,7 +130,8 @@ PetscErrorCode BeginStep(TS ts)
     else if (ts->steps && I.at_begin) PetscCall(IsOwnState(ts, I.t0, I.U0, I.V0, &I.own_start));
     I.have_step = I.at_begin = PETSC_FALSE;
     PetscCall(StartFromSolution(ts));
-    I.at_begin = PETSC_TRUE;
+    I.at_begin    = PETSC_TRUE;
+    I.was_changed = PETSC_FALSE;
   } else if (I.have_step) {
     PetscCall(CommitStep(ts));
     if (I.change.test) PetscCall(ChangeCoordinates(ts, false));

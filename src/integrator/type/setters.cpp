@@ -8,6 +8,7 @@
 #include "integrator/step/step.h"
 #include "integrator/coordinates/rotations.h"
 #include "integrator/equations/rows.h"
+#include "integrator/start/start.h"
 #include "settings.h"
 
 namespace hht3
@@ -194,6 +195,7 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(Interpolate);
   HHT3_COMPOSE(EvaluateAt);
   HHT3_COMPOSE(EvaluatePresent);
+  HHT3_COMPOSE(NoteChange);
   HHT3_COMPOSE(CheckpointSave);
   HHT3_COMPOSE(CheckpointLoad);
   HHT3_COMPOSE(ReadCheckpoint);
