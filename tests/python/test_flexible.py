@@ -322,6 +322,20 @@ class Beam(unittest.TestCase):
         np.testing.assert_allclose(found.real, np.real(exact), rtol=1e-5)
         np.testing.assert_allclose(found.imag, np.imag(exact), rtol=1e-3)
 
+    def test_equilibrium_on_a_driven_hub(self):
+        """There is none, although rounding of a blade's forces makes steps ever shorter"""
+        model = flexible.FeModel.from_mesh(beam_mesh(os.path.join(self.folder.name, "blade.msh"), 2., 0.06, 0.02, (4, 1, 1)), flexible.Material(7e10, 0., 2700.))
+        body = flexible.reduce(model, [flexible.Attachment("root"), flexible.Attachment("tip")], modes=2, stiffening=True).modal()
+        for speed in np.arange(73.5, 74.6, 0.1):
+            scene = h.Scene()
+            hub = scene.add("hub", h.RigidBody(1, np.eye(3), angular_velocity=(0, 0, speed)))
+            scene.connect("pin", h.Revolute, hub, scene.ground, (0, 0, 0))
+            scene.add("drive", h.RotationalMotion(hub.marker(), scene.ground.marker(), speed, of="velocity"))
+            blade = scene.add("blade", h.FlexibleBody(body, angular_velocity=(0, 0, speed), velocity=(0, speed, 0)))
+            scene.add("root", h.Fixed(blade.attachment("root").marker(), hub.marker()))
+            with self.assertRaisesRegex(h.Error, "no static equilibrium found.* most in rotational motion drive"):
+                scene.run().equilibrium()
+
     def held(self, whole, assembly, place=(0., 0., 0.), law=None, **policy):
         """The beam clamped at its root, and at its tip by `law` or a clamp that misses it by `place`: scene, body, tip, what is at the tip"""
         scene = h.Scene()
