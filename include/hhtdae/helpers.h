@@ -12,6 +12,7 @@
 
 #include "hhtdae/scene.h"
 #include <cmath>
+#include <type_traits>
 
 namespace hhtdae
 {
@@ -92,6 +93,7 @@ inline RigidBody composed(const std::vector<RigidBody> &parts)
    direction make the markers yourself. */
 template <class Joint> Element connect(Scene &scene, const std::string &name, Body i, Body j, const Vector3 &point, const Vector3 &axis = Vector3::UnitZ())
 {
+  static_assert(!std::is_same_v<Joint, Universal>, "connect() makes z axes parallel, those of a Universal are perpendicular: give it two markers of their own");
   const Matrix3 A = axesAlong(axis);
   Joint         joint;
   joint.i = scene.markerAt(i, point, A);

@@ -73,6 +73,17 @@ std::string Number(double x)
   return o.str();
 }
 
+/* Alike markers, as other joints have them, have parallel z axes, from where no direction leads to perpendicular ones */
+std::string HintOnAxes(const SceneData &s, const ElementData &e)
+{
+  if (std::string(e.type) != "universal") return "";
+  const auto z = [&](Marker m) {
+    const MarkerData &k = s.markers[m.id];
+    return Vector3(k.body < 0 ? Vector3(k.R.col(2)) : Vector3(s.bodies[k.body].A * k.R.col(2)));
+  };
+  return z(e.i).cross(z(e.j)).norm() > 1e-3 ? "" : ": z of marker i has to be perpendicular to z of marker j, and is parallel to it";
+}
+
 /* Lists the elements whose relative misfit is larger than `beyond`, the worst first, one per line, at most max_named */
 std::string ListWorst(const SceneData &s, const std::vector<Misfit> &m, double Misfit::*relative, double Misfit::*absolute,
                       const char *what, double beyond)
@@ -84,7 +95,7 @@ std::string ListWorst(const SceneData &s, const std::vector<Misfit> &m, double M
   std::string text;
   for (std::size_t k = 0; k < order.size() && k < max_named; k++)
     text += "\n  " + std::string(s.elements[order[k]].type) + " " + s.elements[order[k]].name + ": " + what + " by " +
-            Number(m[order[k]].*absolute);
+            Number(m[order[k]].*absolute) + HintOnAxes(s, s.elements[order[k]]);
   if (order.size() > max_named) text += "\n  and " + std::to_string(order.size() - max_named) + " more";
   return text;
 }
