@@ -31,7 +31,8 @@ namespace hhtdae
 
 /* Moves the run to static equilibrium at time t, at rest: the equilibrium that a descent from the present state reaches, or the nearest one.
    Motions are held at their values at t; rates of first-order states are zero, and states that nothing reads keep their values. With motions
-   of velocities or accelerations that are not zero there is no equilibrium. */
+   of velocities or accelerations that are not zero there is no equilibrium. Motions of positions have no velocity in it: a run in time
+   gives it to the bodies as it begins, AssembleAt() for a Linearization of what turns. */
 PetscErrorCode StaticEquilibrium(TS ts, PetscReal t);
 
 /* Moves the run to the nearest positions and velocities, in the metric of the masses, that satisfy all constraints and motions at time t.

@@ -5,6 +5,7 @@ import os
 import pathlib
 import tempfile
 import unittest
+import warnings
 
 import numpy as np
 
@@ -333,6 +334,53 @@ class Runs(unittest.TestCase):
                 run.solve(1.)
                 np.testing.assert_allclose(run["x"], run.times + np.maximum(run.times - 0.5, 0)**2, atol=1e-6)
                 self.assertTrue(np.all(np.diff(run.times) > 0))
+
+    def test_parameters_between_two_parts(self):
+        """A spring that becomes four times as stiff at rest at its longest: the acceleration is right at once; a run that goes on from a checkpoint begins anew, too"""
+        def spring():
+            scene = h.Scene()
+            k = scene.parameter("k", 1.)
+            m = scene.add("mass", h.PointMass(position=(1, 0, 0))).marker()
+            x = h.displacement(m, "x")
+            scene.add("spring", h.UserForce(m, force=[-k * x, 0, 0]))
+            scene.channel("x", x)
+            return scene, scene.run(tolerance=1e-9)
+        scene, run = spring()
+        run.solve(2 * np.pi)
+        scene.set(k=4.)
+        n = len(run.times)
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "state")
+            run.save(file)
+            run.solve(2 * np.pi + 2)
+            other, again = spring()
+            other.set(k=4.)
+            again.load(file)
+            again.solve(2 * np.pi + 2)
+        np.testing.assert_allclose(run["x"][n:], np.cos(2 * (run.times[n:] - 2 * np.pi)), atol=1.5e-5)
+        self.assertEqual(run["x"][-1], again["x"][-1])
+        np.testing.assert_array_equal(run.times[n:], again.times[1:])
+
+    def test_a_motion_that_jumps_between_two_parts(self):
+        """Positions go to the nearest that meet it, or the error names it and no step is made"""
+        for options in ({}, {"ts_hhtdae_start": "report"}):
+            scene = h.Scene(planar=True)
+            w = scene.parameter("w", 10.)
+            disc = scene.add("disc", h.RigidBody(1, np.eye(3), angular_velocity=(0, 0, 10.)))
+            scene.connect("pin", h.Revolute, disc, scene.ground, (0, 0, 0))
+            i, j = disc.marker(), scene.ground.marker()
+            scene.add("drive", h.RotationalMotion(i, j, lambda t: w * t))
+            scene.channel("angle", h.angle(i, j))
+            run = scene.run(tolerance=1e-6, options=options).solve(10.)
+            scene.set(w=10.1)
+            n = run.steps
+            if options:
+                with self.assertRaisesRegex(h.Error, r"At t = 10. the positions violate the constraints, which have been changed.*the largest violation is 1, in row .*drive"):
+                    run.solve(10.5)
+                self.assertEqual(run.steps, n)
+            else:
+                run.solve(10.5)
+                np.testing.assert_allclose(run["angle"][n + 1:], 10.1 * run.times[n + 1:], atol=1e-8)
 
     def test_events(self):
         """A stone that falls through 0.5 m, and one that a switch at 0.75 m makes weightless"""
@@ -779,6 +827,36 @@ class Questions(unittest.TestCase):
         for analysis in (h.Run.kinematics, h.Run.assemble):
             self.assertAlmostEqual(analysis(scene.run()).snapshot().motion(i).angular_velocity[2], 3., delta=1e-6)
 
+    def test_linearization_at_rest(self):
+        """Static equilibrium under a motion that moves: velocities are those of rest, linearize() says so; assemble() gives the others"""
+        for motion, moves in ((lambda t: 5 * t, True), (lambda t: 5 * t**2, False)):
+            scene = h.Scene(gravity=(0, -9.81, 0))
+            rotor = scene.add("rotor", h.RigidBody(1, np.eye(3), angular_velocity=(0, 0, 5. * moves)))
+            scene.add("bearing", h.Bushing(rotor.marker(), scene.ground.marker(), stiffness=(1e4,) * 3, torsional_stiffness=(1e4, 1e4, 0)))
+            scene.add("drive", h.RotationalMotion(rotor.marker(), scene.ground.marker(), motion))
+            run = scene.run().equilibrium()
+            with warnings.catch_warnings(record=True) as told:
+                warnings.simplefilter("always")
+                run.linearize()
+                self.assertEqual(len(told), moves)
+                run.assemble().linearize()
+            self.assertEqual(len(told), moves)
+            self.assertAlmostEqual(run.snapshot().motion(rotor).angular_velocity[2], 5. * moves)
+            self.assertAlmostEqual(run.snapshot().motion(rotor).position[1], -9.81e-4)
+            for warning in told:
+                self.assertRegex(str(warning.message), r"at rest at t = 0, although motions move them.*Run.assemble\(\)")
+
+    def test_response_beside_a_free_motion(self):
+        """A shaft that nothing keeps from turning: a force across it has a response at 0 rad/s, a torque has none"""
+        scene = h.Scene()
+        shaft = scene.add("shaft", h.RigidBody(2., np.diag([.2, .2, .1]), angular_velocity=(0, 0, 30.)))
+        scene.add("bearing", h.Bushing(shaft.marker(), scene.ground.marker(), stiffness=(1e5, 1e5, 1e5), torsional_stiffness=(1e4, 1e4, 0), damping=(10, 10, 10)))
+        m, small = shaft.marker(), scene.run().linearize()
+        x = small.response(h.Excitation.force(m, (1, 0, 0)), h.displacement(m, "x"), [0., 100., 0.])
+        np.testing.assert_allclose(x, [1e-5, 1 / (1e5 - 2e4 + 1000j), 1e-5], rtol=1e-9)
+        with self.assertRaisesRegex(h.Error, "no solution at 0. rad/s .*nothing holds is pushed"):
+            small.response(h.Excitation.torque(m, (0, 0, 1)), h.displacement(m, "x"), [0.])
+
     def test_linearization(self):
         """A mass on a damped spring: mode, frequency response, minimal coordinates, operators"""
         scene = h.Scene()
@@ -963,6 +1041,28 @@ class Mistakes(unittest.TestCase):
             with self.assertRaisesRegex(error, words):
                 call()
         self.assertEqual(other._elements, count)
+
+    def test_words_of_python(self):
+        """Names in messages are those of Python; options are told whose values are none; a channel without a name has one"""
+        scene, rod, pin = pendulum()
+        with self.assertRaisesRegex(TypeError, "channel q: 'x' is no number and no formula"):
+            scene.channel("q", "x")
+        with self.assertRaisesRegex(h.Error, "option -ts_hhtdae_alpha: Input string abc has no numeric value"):
+            scene.run(options={"ts_hhtdae_alpha": "abc"})
+        with self.assertRaisesRegex(TypeError, "a Universal needs z axes that are perpendicular"):
+            scene.connect("u", h.Universal, rod, scene.ground, (0, 0, 0))
+        scene, rod, pin = pendulum()
+        scene.channel("t", h.time())
+        scene.channel("", h.time())
+        with tempfile.TemporaryDirectory() as folder:
+            scene.output(csv=os.path.join(folder, "run.csv"), dt=0.1)
+            self.assertEqual(list(scene.solve(0.1).channels), ["time", "t", "channel 1"])
+            with open(os.path.join(folder, "run.csv")) as table:
+                self.assertIn("channel 1", table.readline())
+        scene, rod, pin = pendulum()
+        scene.add("u", h.Universal(rod.marker((-0.5, 0, 0)), scene.ground.marker()))
+        with self.assertRaisesRegex(h.Error, "universal u: not met by 1: z of marker i has to be perpendicular to z of marker j, and is parallel to it"):
+            scene.run()
 
     def test_markers_that_cannot_be(self):
         """The error names the body, and which condition is not met"""

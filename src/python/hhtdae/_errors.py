@@ -58,6 +58,8 @@ _NAMES = [
     (r"\bTSHHT3CheckpointLoad\(\)", "Run.load()"),
     (r"\bSnapshot::take\(\)", "Run.snapshot()"),
     (r"\bLinearization::take\(\)", "Run.linearize()"),
+    (r"\bscene\.attachment\((.+?), \.\.\.\) or scene\.node\(\.\.\.\) as", r"the attachment(name) or node(label) of \1 as"),
+    (r"\bmodes = PETSC_DEFAULT\b", "modes=None"),
     (r"\bSlowestModes\(\)", "Linearization.modes(count)"),
     (r"\bFeModel::readMesh\b", "FeModel.from_mesh()"),
     (r"\bReduction::(\w+)", r"reduce(): \1"),

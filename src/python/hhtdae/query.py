@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Tuple
 
 import numpy as np
+from petsc4py import PETSc
 
 from . import _core
 from ._errors import Error
@@ -142,6 +143,25 @@ class BodyPart:
     share: float
 
 
+def _rests_against_motions(ts):
+    """Whether all velocities are zero, as in static equilibrium, where motions of displacement have some"""
+    u, v = ts.getSolution2()
+    rows = _core.get_is(ts, "holonomic")
+    if v.norm(PETSc.NormType.INFINITY) > 0 or not rows:
+        return False
+    t, misfit = ts.getTime(), []
+    dt = 1e-6 * max(1., abs(t))
+    for k in range(3):
+        f = u.duplicate()
+        ts.computeI2Function(t + k * dt, u, v, v, f)
+        part = f.getSubVector(rows)
+        misfit.append(part.copy())
+        f.restoreSubVector(rows, part)
+    first, second, third = misfit
+    change = 4. * (second - first) - (third - first)  # 2 dt times the rate: of a motion that is about to turn it is none
+    return change.norm(PETSc.NormType.INFINITY) > 1e-5 * dt
+
+
 @dataclass(eq=False)
 class StateSpace:
     """z' = A z + B f, y = C z + D f in minimal coordinates; unpacks as A, B, C, D, the arguments of scipy.signal.StateSpace."""
@@ -217,6 +237,9 @@ class Linearization:
         self._scene, self._axes = run.scene, axes
         self._time, self._steps = run._at(time), ts.getStepNumber()
         self._changes = None  # see _unsteadiness()
+        if not self._steps and _rests_against_motions(ts):
+            warnings.warn("linearize(): bodies are at rest at t = %g, although motions move them, and small motions are those of what stands still. Run.assemble() gives them the velocities of the motions"
+                          % self._time, RuntimeWarning, 4)
 
     def _unsteadiness(self):
         """The name of the body whose velocity or angular velocity changes most relative to the axes, the rate of this change (1/s^2, lengths

@@ -1,6 +1,7 @@
 """Runs of a scene: everything that changes."""
 
 import os
+import re
 import shutil
 import tempfile
 import warnings
@@ -12,6 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from . import _core, integrator
+from ._errors import Error
 from .events import Signs
 from .expressions import CONDITIONS, _expression
 from .ranks import together
@@ -44,6 +46,13 @@ class _Given:
 _given = []  # nested temporary options, the innermost last
 
 
+def _named(error, values):
+    """An error of PETSc about the value of an option, with the option's name, which PETSc does not tell"""
+    found = re.match("Input string (.*) has no ", error.message)
+    names = ["-" + name for name, value in values.items() if found and str(value) == found[1]]
+    return Error(error.ierr, "option %s: %s" % (" or ".join(names), error.message), error.trace) if names else error
+
+
 @contextmanager
 def temporary_options(given):
     """A context in which PETSc's database contains the given options; options that the user has set have precedence. Yields a list that, after
@@ -56,6 +65,8 @@ def temporary_options(given):
         own.values = {n: x for n, x in ((name.lstrip("-"), x) for name, x in (given or {}).items()) if not PETSc.Options().hasName(n)}
         own.put()
         yield unused
+    except Error as error:
+        raise _named(error, own.values) from error.__cause__
     finally:
         own.take()
         unused.extend(name for name in own.values if name not in own.used)
@@ -146,7 +157,8 @@ class Run(Channels):
 
     @one_thread
     def solve(self, until: float) -> "Run":
-        """Continues the run to the time `until`; returns the run. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
+        """Continues the run to the time `until`; returns the run. If `Scene.set` has changed parameters since the last `solve`, the integrator
+        restarts. Collective. Ctrl-C ends it with KeyboardInterrupt after the present step."""
         self._not_solving("solve")
         ts = self._open()
         until = number(until, "solve(): until")
@@ -175,8 +187,8 @@ class Run(Channels):
 
     def step_by(self, dt: float, until: float) -> Iterator[float]:
         """Continues the run to `until` in intervals of dt, and yields the time after each of them. A controller may change parameters in between;
-        the integrator then restarts from the nearest positions that satisfy prescribed displacements and user constraints with the new values. A
-        terminal event ends the iteration after the time of the event.
+        the integrator then restarts, as between two calls of `solve`, from the nearest positions that satisfy prescribed displacements and user
+        constraints with the new values. A terminal event ends the iteration after the time of the event.
 
         >>> for t in run.step_by(0.01, until=5):
         ...     torque.set(-gain * run.snapshot().value(error))
@@ -189,10 +201,7 @@ class Run(Channels):
         for k in range(1, count + 1):
             end = until if k == count else begin + k * dt
             self.solve(end)
-            before = self._present_parameters()
             yield self.time
-            if self.ts and self._present_parameters() != before:
-                self.restart()
             if self._ended or self.time < end:
                 return
 
@@ -293,13 +302,14 @@ class Run(Channels):
     def _project_restarts(self):
         """Makes restarts project the initial values: interpolated velocities at an event satisfy the constraints only up to the tolerance of the
         step, and positions do not satisfy a constraint whose parameter has been changed. This is done for all restarts of a run with events or
-        such constraints, so that a run resumed from a checkpoint continues as the original one: test Checkpoints of test_events.py."""
-        if (self._events or self.scene._constraints_jump) and not PETSc.Options().hasName("ts_hhtdae_start"):
+        such constraints that has begun, so that a run resumed from a checkpoint continues as the original one: test Checkpoints of test_events.py."""
+        chosen = PETSc.Options().hasName("ts_hhtdae_start") or "ts_hhtdae_start" in [name.lstrip("-") for name in self._options]
+        if (self._events or self.scene._constraints_jump) and not chosen:
             integrator.set_start(self._open(), "project")
 
     def restart(self) -> None:
-        """Restarts the integrator, which then uses no values of earlier steps. To be called after a callback or a parameter has made a force or
-        motion jump."""
+        """Restarts the integrator, which then uses no values of earlier steps. To be called after a callback, or a parameter within a run, has
+        made a force or motion jump; between two calls of `solve` this is done for parameters."""
         self._numbers = None
         self._open().restartStep()
         if self.steps:
@@ -326,9 +336,11 @@ class Run(Channels):
 
     @one_thread
     def equilibrium(self, time: Any = None) -> "Run":
-        """Moves the run to static equilibrium at a time, at rest; returns the run. States that no equation reads, such as integrals for output,
-        keep their values. If initial values violate constraints, call ``scene.start(assembly="project")`` before the run is made, or with "off":
-        then the iteration starts from the described positions. Collective."""
+        """Moves the run to static equilibrium at a time, at rest; returns the run. Prescribed displacements have their values at that time, and
+        no velocity: `assemble` afterwards gives bodies the velocities that motions prescribe, as `linearize` of what turns needs them; `solve`
+        does so by itself. States that no equation reads, such as integrals for output, keep their values. If initial values violate
+        constraints, call ``scene.start(assembly="project")`` before the run is made, or with "off": then the iteration starts from the described
+        positions. Collective."""
         _core.static_equilibrium(self._open(), self._at(time))
         return self
 

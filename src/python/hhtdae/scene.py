@@ -12,7 +12,7 @@ from . import _core
 from .bodies import FlexibleBody, PointMass, RigidBody, Shape, _direction, axes_along
 from .elements import ELEMENTS
 from .expressions import Expression, Parameter, describing
-from .joints import RotationalMotion, TranslationalMotion, UserConstraint
+from .joints import RotationalMotion, TranslationalMotion, Universal, UserConstraint
 from .measures import Measure, description
 from .run import Run
 from .recipe import Recipe
@@ -193,9 +193,9 @@ class Scene:
         Numbers of the description change for runs made from now on; existing runs keep the old ones. Formulas of the state and callbacks,
         which read parameters when they are evaluated, change at once in all runs: simultaneous runs with different values there need separate scenes.
         `Run.snapshot`, `Run.sample` and `Run.linearize` at the present time change, too; their forces, accelerations and reactions are then those
-        with which the run continues. If a value makes a formula jump between parts of a run, in `Run.on_step` or in actions of events, call
-        `Run.restart`: steps across a jump lose accuracy. `Run.step_by` does so by itself. If prescribed displacements or user constraints depend
-        on parameters, the restart moves positions to the nearest that satisfy them.
+        with which the run continues. If a value makes a formula jump in `Run.on_step` or in actions of events, call `Run.restart`: steps across a
+        jump lose accuracy. Between two parts of a run `Run.solve` and `Run.step_by` do so by themselves. If prescribed displacements or user
+        constraints depend on parameters, positions are then moved to the nearest that satisfy them.
         """
         values = {name: number(value, "parameter " + name) for name, value in values.items()}
         for name in sorted(values, key=lambda name: name in self._parameters):  # all or none are set: unknown names come first and raise an error
@@ -286,7 +286,10 @@ class Scene:
 
     def _formula(self, x, who):
         keep = []
-        given = description(x, keep)
+        try:
+            given = description(x, keep)
+        except TypeError as error:
+            raise TypeError("%s: %s" % (who, error)) from error
         self._keeps(keep, who)
         return given
 
@@ -338,6 +341,9 @@ class Scene:
 
         >>> scene.connect("pin", hhtdae.Revolute, arm, scene.ground, (0, 0, 0), axis=(0, 0, 1))
         """
+        if joint is Universal:
+            raise TypeError("Scene.connect(%r): a Universal needs z axes that are perpendicular, and connect() makes them parallel: Scene.add(name, Universal(i.marker_at(point, axes_along(axis_i)), "
+                            "j.marker_at(point, axes_along(axis_j))))" % name)
         _direction(axis, "Scene.connect(): axis")
         axes = axes_along(axis)
         return self.add(name, joint(i.marker_at(point, axes), j.marker_at(point, axes), **fields))
@@ -379,7 +385,7 @@ class Scene:
 
     def channel(self, name: str, value: Formula, unit: str = "") -> None:
         """A result that runs record under a name: a measure, or a formula of measures and parameters; unit: for tables and plots."""
-        text(name, "Scene.channel()")
+        name = text(name, "Scene.channel()") or "channel %d" % len(self._channels)
         self._describe("channel " + name)
         self._core.channel(name, self._formula(value, "channel " + name), unit)
         self._channels.append((name, unit))
