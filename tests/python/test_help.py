@@ -92,6 +92,7 @@ class Pickles(unittest.TestCase):
         self.assertEqual(again.sol(0.5), s.sol(0.5))
         self.assertEqual(again.statistics, s.statistics)
         error = pickle.loads(pickle.dumps(h.Error(62, "a message")))
+        self.assertEqual(repr(error), "hhtdae.Error(62, 'a message')")
         self.assertEqual((str(error), error.ierr), ("a message", 62))
         scene = h.Scene()
         b = scene.add("b", h.PointMass(velocity=(1, 0, 0)))

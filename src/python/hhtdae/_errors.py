@@ -28,6 +28,9 @@ class Error(PETSc.Error):
     def __str__(self):
         return self.message
 
+    def __repr__(self):
+        return "hhtdae.Error(%d, %r)" % (self.ierr, self.message)
+
     def __reduce__(self):
         return Error, (self.ierr, self.message, self.trace)
 
