@@ -18,7 +18,8 @@
 
     the body passed to take()             a driven hub for its blades, the rotor for a shaft that is not round; the frequencies of modes in the
                                           axes of a round rotor differ from those in space by its speed
-    flexible bodies                       if no body is passed and all flexible bodies rotate alike, since modal coordinates are in body axes
+    flexible bodies                       if no body is passed and all bodies in modal coordinates rotate alike, since these are in body axes
+                                          (for whole bodies pass the one that carries them)
     nothing                               otherwise, or if the ground is passed to take(): an axisymmetric rotor of rigid discs at constant
                                           speed is steady in space axes
 
@@ -29,6 +30,8 @@
   directions that constraints leave free, orthonormal in the metric of the masses. For a single degree of freedom the result is that of
   motion along its path at any speed: the rod has value^2 = -m g l cos(angle)/J. The sparse methods, response() and SlowestModes(), take
   constraints as they are at this time; they are meant for equilibria and steady motions.
+  Loads, reactions and deformations that stiffen elastic bodies are those at this time in all calls: such bodies need an equilibrium or a
+  steady motion, to which a run with damping leads. steadiness() tells how far the state is from one.
   All calls are collective, with the same results on every rank. A linearization is valid as long as its TS exists.
 */
 #ifndef HHTDAE_LINEARIZE_H
@@ -36,6 +39,7 @@
 
 #include "hhtdae/query.h"
 #include <complex>
+#include <string>
 #include <petscmat.h>
 
 namespace hhtdae
@@ -79,6 +83,16 @@ struct StateSpace {
   std::vector<double> A, B, C, D;
 };
 
+/* How far the state of a linearization is from one that is steady as seen from its axes. Changes are accelerations relative to the size of the scene, 1/s^2: what moves by itself with a
+   rate x goes on with its mode where they are small beside x^2. */
+struct Steadiness {
+  std::string body, elastic; /* that changes its velocities most; the same among elastic bodies, modal or whole */
+  double      change = 0, elastic_change = 0;
+  double      square_rate = 0; /* of the motion of the scene, or of its fall: 1/s^2 */
+  double      spin        = 0; /* of the body that turns fastest, seen from space */
+  std::string turning;         /* the body with modes that turns fastest relative to the axes, in which its modes are wrong: modal coordinates are in axes of the body; empty: none */
+};
+
 class Linearization
 {
 public:
@@ -105,6 +119,8 @@ public:
   /* Minimal coordinates: dense algebra as that of modes(). Of motions as inputs it takes those of accelerations: others would enter with
      their derivatives. */
   PetscErrorCode stateSpace(const std::vector<Excitation> &in, const std::vector<Measure> &out, StateSpace *s) const;
+
+  PetscErrorCode steadiness(Steadiness *s) const;
 
   /* M, C, K above in MATAIJ, one row and column for each unknown of the scene; they belong to this object */
   PetscErrorCode operators(Mat *M, Mat *C, Mat *K) const;

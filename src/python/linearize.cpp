@@ -63,6 +63,15 @@ py::tuple States(Linearized &l, py::list in, py::list out)
                         FromDoubles(s.C.data(), {s.outputs, s.states}), FromDoubles(s.D.data(), {s.outputs, s.inputs}));
 }
 
+py::dict HowSteady(Linearized &l)
+{
+  using py::literals::operator""_a;
+  Steadiness s;
+  Check(l.get().steadiness(&s));
+  return py::dict("body"_a = s.body, "elastic"_a = s.elastic, "change"_a = s.change, "elastic_change"_a = s.elastic_change, "square_rate"_a = s.square_rate, "spin"_a = s.spin,
+                  "turning"_a = s.turning);
+}
+
 /* Copies of M, C and K, since the library destroys its own with the linearization */
 py::tuple Operators(Linearized &l)
 {
@@ -112,6 +121,7 @@ void BindLinearize(py::module_ &m)
     })
     .def("response", Response)
     .def("state_space", States)
+    .def("steadiness", HowSteady)
     .def("operators", Operators)
     .def("animate", [](Linearized &l, const Mode &mode, const std::string &prefix, double amplitude, int frames) {
       Check(l.get().animate(mode, prefix, amplitude, frames));

@@ -1,4 +1,4 @@
-/* Data of a linearization: computed by linearize.cpp, solved by minimal.cpp (with row_rates.cpp) and response.cpp, evaluated by small_motion.cpp. */
+/* Data of a linearization: computed by linearize.cpp, solved by minimal.cpp (with row_rates.cpp) and response.cpp, evaluated by small_motion.cpp and steadiness.cpp. */
 #ifndef HHTDAE_SCENE_LINEARIZATION_H
 #define HHTDAE_SCENE_LINEARIZATION_H
 

@@ -5,6 +5,7 @@ import pickle
 import sys
 import tempfile
 import unittest
+import warnings
 
 import numpy as np
 from petsc4py import PETSc
@@ -335,6 +336,98 @@ class Beam(unittest.TestCase):
             scene.add("root", h.Fixed(blade.attachment("root").marker(), hub.marker()))
             with self.assertRaisesRegex(h.Error, "no static equilibrium found.* most in rotational motion drive"):
                 scene.run().equilibrium()
+
+    def told(self, *calls):
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            for call in calls:
+                call()
+        return [str(w.message) for w in told]
+
+    def test_modes_under_tension(self):
+        """A whole body and a reduced one are not in equilibrium at the start, and small motions are others there"""
+        attachments = [flexible.Attachment("root"), flexible.Attachment("tip")]
+        stiffening, tension = flexible.reduce(self.model, attachments, modes=6, stiffening=True), 20 * E * D**4 / 12 / L**2
+        for whole in (True, False):
+            scene = h.Scene()
+            b = flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(attachments=attachments)) if whole else scene.add("beam", h.FlexibleBody(stiffening.modal()))
+            scene.add("clamp", h.Fixed(b.attachment("root").marker(), scene.ground.marker()))
+            scene.add("load", h.UserForce(b.attachment("tip").marker(), force=(tension, 0, 0)))
+            start, still = scene.run().linearize(), scene.run().equilibrium().linearize()
+            slowest = []
+            self.assertRegex(" ".join(self.told(lambda: slowest.extend(start.modes(1)))), r"modes\(count\): the state.*elastic body beam.*Bring the run to equilibrium by Run.equilibrium\(\);")
+            if not whole:
+                self.assertRegex(" ".join(self.told(start.modes)), r"modes\(\): the state.*elastic body beam")
+            self.assertEqual(self.told(lambda: slowest.extend(still.modes(1))), [])
+            self.assertGreater(abs(slowest[1].value), 1.1 * abs(slowest[0].value))
+        scene = h.Scene()  # the frame of an attachment turns by itself; the body, of which it is a small part, hardly does
+        b = flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(attachments=attachments))
+        scene.add("clamp", h.Fixed(b.attachment("root").marker(), scene.ground.marker()))
+        scene.add("load", h.UserForce(b.attachment("tip").marker(), moment=(0.1, 0, 0)))
+        small = scene.run().linearize()
+        self.assertEqual(self.told(lambda: small.modes(1)), [])
+
+    def test_modes_of_a_free_body(self):
+        """Its deformation alone tells: the centre of mass and the axes of a bar that spins are steady; one that falls is at rest in itself, one that is pulled is not"""
+        for whole in (True, False):
+            for spin, gravity, pull, expected in ((30., 0., 0., 1), (0., 9.81, 0., 0), (0., 0., 0., 0), (0., 0., 1e5, 1)):
+                scene, w = h.Scene(gravity=(0, 0, -gravity)), np.array([0, 0, spin])
+                if whole:
+                    b = flexible.FullFeBody(scene, "bar", self.model, flexible.FullBody(angular_velocity=w, velocity=np.cross(w, (-L / 2, 0, 0)), attachments=[flexible.Attachment("tip")]))
+                else:
+                    b = scene.add("bar", h.FlexibleBody(self.body, angular_velocity=w))
+                scene.add("pull", h.UserForce(b.attachment("tip").marker(), force=(pull, 0, 0)))
+                small = scene.run().linearize()
+                told = self.told(lambda: small.modes(8) if whole else small.modes())
+                self.assertEqual(len(told), expected, (whole, spin, gravity, pull))
+                self.assertTrue(all("elastic body bar" in t for t in told))
+
+    def test_modes_of_a_blade(self):
+        """On a hub at speed, from the hub: at the start it is neither extended nor stiffened, and says so; after a run with damping it is steady, with the first frequency of flap
+        of a beam that turns, Wright et al., Journal of Applied Mechanics 49, 1982: 4.1373 sqrt(EI/(m L^4)) at twice this speed"""
+        unit = np.sqrt(E * D**2 / 12 / RHO) / L**2
+        spin = np.array([0, 0, 2 * unit])
+        blade = flexible.reduce(self.model, [flexible.Attachment("root")], modes=10, stiffening=True).modal()
+        scene = h.Scene()
+        d = scene.parameter("d", 1.)
+        hub = scene.rigid_body("hub", inertia=np.eye(3), angular_velocity=spin)
+        scene.connect("pin", h.Revolute, hub, scene.ground, (0, 0, 0))
+        scene.add("drive", h.RotationalMotion(hub.marker(), scene.ground.marker(), spin[2], of="velocity"))
+        b = scene.add("blade", lambda: h.FlexibleBody(blade, position=(0, 0, 0), angular_velocity=spin, velocity=np.cross(spin, (L / 2, 0, 0)), damping=d.get()))
+        scene.add("root", h.Fixed(b.attachment("root").marker(), hub.marker()))
+        small = scene.run().linearize(axes=hub)
+        told = self.told(small.modes, lambda: small.state_space([], []), lambda: small.modes(3))
+        self.assertEqual([t.split(":")[0] for t in told], ["modes()", "state_space()", "modes(count)"])
+        for t in told:
+            self.assertRegex(t, r"elastic body blade.*Let what vibrates in the turning scene come to rest by a run with damping.*Run.equilibrium\(\), which stops")
+            self.assertNotIn("without a count", t)
+        run = scene.solve(0.2, tolerance=1e-7)
+        scene.set(d=0.)
+        steady = scene.run(after=run).linearize(axes=hub)
+        found = []
+        self.assertEqual(self.told(lambda: found.extend(steady.modes()), lambda: steady.state_space([], []), lambda: steady.modes(3)), [])
+        lag, flap = sorted(m.value.imag / unit for m in found if m.value.imag > 1)[:2]  # of a square beam flap^2 - lag^2 is the square of the speed
+        self.assertAlmostEqual(flap, 4.1373, delta=0.005)
+        self.assertAlmostEqual(lag, np.sqrt(4.1373**2 - 4), delta=0.005)
+
+    def test_modes_in_other_axes(self):
+        """A shaft's modal coordinates turn with the shaft"""
+        scene, spin = h.Scene(), (30., 0, 0)
+        shaft = scene.add("shaft", h.FlexibleBody(self.body, angular_velocity=spin))
+        tip = shaft.attachment("tip").marker()
+        scene.add("left", h.Spherical(shaft.attachment("root").marker(), scene.ground.marker()))
+        scene.add("right", h.InLine(tip, scene.ground.marker((L, 0, 0), h.axes_along((1, 0, 0)))))
+        for axes in (None, shaft, scene.ground):
+            small = scene.run().linearize(axes=axes)
+            told = self.told(small.modes, lambda: small.modes(3), lambda: small.state_space([], []), lambda: small.response(h.Excitation.force(tip, (1, 0, 0)), h.displacement(tip, "x"), 30.))
+            self.assertEqual([t.split(":")[0] for t in told], ["modes()", "modes(count)", "state_space()", "response()"] if axes is scene.ground else [])
+            self.assertTrue(all("body shaft turns relative to the axes" in t and "linearize(axes=body)" in t for t in told))
+        for spins, axes, expected in (((300., 302.), "alike", []), ((300., 310.), "unlike", ["bar 1"]), ((0.01, 0.01), "ground", [])):  # about the bar's axis: nothing accelerates
+            scene = h.Scene()
+            for k, spin in enumerate(spins):
+                scene.add("bar %d" % k, h.FlexibleBody(self.body, position=(0, k, 0), angular_velocity=(spin, 0, 0)))
+            small = scene.run().linearize(axes=scene.ground if axes == "ground" else None)
+            self.assertEqual([t.split("body ")[1][:5] for t in self.told(small.modes)], expected)
 
     def held(self, whole, assembly, place=(0., 0., 0.), law=None, **policy):
         """The beam clamped at its root, and at its tip by `law` or a clamp that misses it by `place`: scene, body, tip, what is at the tip"""

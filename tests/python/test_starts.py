@@ -135,6 +135,23 @@ class Steady(unittest.TestCase):
             small.state_space([], [])
         with self.assertWarnsRegex(RuntimeWarning, r"modes\(count\): the state"):
             small.modes(1)
+        with self.assertWarnsRegex(RuntimeWarning, "body rod"):  # horizontal: the motion that is asked for has the rate zero
+            self.pendulum(np.pi / 2, 0.)[0].run().linearize().modes(1)
+
+    def test_motion_without_a_rate(self):
+        """A driven hub may stand at any angle, and is no slow motion beside which what a run leaves in accelerations counts"""
+        scene, W, small = h.Scene(), np.array([0, 0, 5.]), 1e-5
+        hub = scene.add("hub", h.RigidBody(1., np.eye(3), angular_velocity=W))
+        scene.connect("pin", h.Revolute, hub, scene.ground, (0, 0, 0))
+        scene.add("drive", h.RotationalMotion(hub.marker(), scene.ground.marker(), 5., of="velocity"))
+        x = np.array([0.5 + 0.5 * np.cos(small), 0.5 * np.sin(small), 0])
+        mast = scene.add("mast", h.RigidBody(1., np.eye(3), position=x, velocity=np.cross(W, x), rotation=h.rotation((0, 0, 1), small), angular_velocity=W))
+        scene.connect("hinge", h.Revolute, mast, hub, (0.5, 0, 0))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            hub_mode, lag = scene.run().linearize(axes=hub).modes(2)
+        self.assertLess(abs(hub_mode.value), 1e-6)
+        self.assertAlmostEqual(lag.value.imag, 5. * np.sqrt(0.25 / 1.25), delta=1e-6)
 
     def test_steady(self):
         """A round rotor from space, a mast on a hub from the hub, and free fall"""

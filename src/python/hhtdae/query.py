@@ -11,7 +11,7 @@ from . import _core
 from ._errors import Error
 from .expressions import _expression
 from .measures import Measure
-from .spec import check_parameters, number, plain
+from .spec import check_parameters, number
 from .threads import one_thread
 from .tracing import compile_tape, ordered
 
@@ -219,14 +219,24 @@ class Linearization:
     x are displacements and small rotations of bodies, and all other unknowns. M, C and K are those at the time of the state. They describe small
     motions at later times only if the state is an equilibrium or a motion that is steady relative to the axes of x. These axes coincide with
     those of space at the time of the state and rotate with the body `axes` (for example a driven hub for its blades); without `axes`, they rotate
-    with the flexible bodies if all of these have the same angular velocity; otherwise, or if `axes` is `scene.ground`, they do not rotate: a
-    rotating axisymmetric rotor of rigid discs is steady relative to space. Frequencies relative to the axes of an axisymmetric rotor differ from
-    those in space by its speed.
+    with the bodies in modal coordinates if all of these have the same angular velocity (for whole bodies name the body that carries them);
+    otherwise, or if `axes` is `scene.ground`, they do not rotate: a rotating axisymmetric rotor of rigid discs is steady relative to space.
+    Frequencies relative to the axes of an axisymmetric rotor differ from those in space by its speed.
 
     The motion of a swinging rod is steady relative to no axes. In such a state `modes()` without a count and `state_space()` describe the rates
     of small motions at this time, including the change of constraints along the motion; `response()` and `modes(count)`, which use sparse
     matrices, are valid for equilibria and steady motions only. They warn if accelerations change the state within a period of the slowest
-    requested motion. A rotor that is not axisymmetric must be linearized relative to itself; no warning indicates this.
+    requested motion. A rotor of rigid bodies that is not axisymmetric must be linearized relative to itself; no warning indicates this.
+
+    The loads and reactions at the time of the state stiffen and bend an elastic body in all of these calls. All of them warn if an elastic body is
+    not steady, or if its modal coordinates rotate relative to the axes. A body that spins from the start on has neither the extension nor the
+    reactions of its speed, and `Run.equilibrium()` would stop it. Let a run with damping come to rest relative to what rotates, and remove the
+    damping for the linearization:
+
+    >>> scene.add("blade", lambda: hhtdae.FlexibleBody(body, angular_velocity=(0, 0, speed), damping=d.get()))  # d = scene.parameter("d", 1.): critical damping
+    >>> run = scene.solve(0.5, tolerance=1e-7)
+    >>> scene.set(d=0.)
+    >>> scene.run(after=run).linearize(axes=hub).modes()
     """
 
     @one_thread
@@ -234,62 +244,49 @@ class Linearization:
         self._core = _core.Linearization()
         ts = run._open()
         self._core.take(ts, None if time is None else number(time, "time"), axes)
-        self._scene, self._axes = run.scene, axes
-        self._time, self._steps = run._at(time), ts.getStepNumber()
-        self._changes = None  # see _unsteadiness()
-        if not self._steps and _rests_against_motions(ts):
+        self._time = run._at(time)
+        self._steadiness = None  # once asked for
+        if not ts.getStepNumber() and _rests_against_motions(ts):
             warnings.warn("linearize(): bodies are at rest at t = %g, although motions move them, and small motions are those of what stands still. Run.assemble() gives them the velocities of the motions"
                           % self._time, RuntimeWarning, 4)
 
-    def _unsteadiness(self):
-        """The name of the body whose velocity or angular velocity changes most relative to the axes, the rate of this change (1/s^2, lengths
-        relative to the distances of bodies), and the square of a rate at which the scene moves. In a steady motion velocities are constant in the
-        axes: a = W x v for axes with the angular velocity W. ("", 0, 0) if the run has made steps since then."""
-        from .scene import Body
-
-        ts = self._core.ts
-        bodies = [Body(self._scene, (k, self._scene.ground._number), name) for k, name, _ in self._scene._moving]
-        if not bodies or ts.getStepNumber() != self._steps:
-            return "", 0., 0.
-        now = _core.Snapshot()
-        now.take(ts, self._time)
-        motion = [now.body(b) for b in bodies]
-        x, v, a, w, turn = (np.array([m[name] for m in motion]) for name in ("position", "velocity", "acceleration", "angular_velocity", "angular_acceleration"))
-        W, gravity = self._spin(now, w), np.array(plain(self._scene._gravity), dtype=float)
-        a, turn = a - np.cross(W, v), turn - np.cross(W, w)
-        if abs(a - gravity).max() <= 1e-9 * abs(gravity).max():  # free fall
-            a[:] = 0
-        size = max(np.ptp(x, axis=0).max(), abs(x).max()) or np.inf
-        change = np.linalg.norm(turn, axis=1) + np.linalg.norm(a, axis=1) / size
-        rate = (w**2).sum(axis=1).max() + (v**2).sum(axis=1).max() / size**2 + np.linalg.norm(gravity) / size
-        return bodies[change.argmax()].name, change.max(), rate
-
-    def _spin(self, now, w):
-        """Angular velocity of the axes, see linearize.h; w: angular velocities of the bodies"""
-        if self._axes is not None:
-            return now.body(self._axes)["angular_velocity"] if self._axes._id >= 0 else np.zeros(3)
-        w = w[[flexible for _, _, flexible in self._scene._moving]]
-        alike = len(w) and np.linalg.norm(w - w[0], axis=1).max() <= 1e-2 * np.linalg.norm(w, axis=1).max()
-        return w.mean(axis=0) if alike else np.zeros(3)
-
-    def _warn_if_unsteady(self, call, rates):
-        """Warns if the state changes too fast for sparse methods, which do not include the change of constraints along the motion; rates: of the
-        requested motions, 1/s"""
-        if self._changes is None:
-            self._changes = self._unsteadiness()
-        body, change, own = self._changes
-        square = max(min((abs(x)**2 for x in rates), default=0.), 1e-4 * own)
-        if square and change > 1e-3 * square:
-            warnings.warn("%s: the state at t = %g is neither in equilibrium nor steady as seen from the axes of the linearization, and small motions are others: accelerations move body %s by "
-                          "%.2g of the scene's size, or turn it by as many radians, within 1 rad of a motion of %.3g rad per unit of time. Take state_space() or modes() without a count, "
-                          "which are of any state; or bring the run to equilibrium by Run.equilibrium(); or name the body from which the motion is steady, linearize(axes=)"
-                          % (call, self._time, body, change / square, square**0.5), RuntimeWarning, 3)
+    def _warn_if_unsteady(self, call, rates, sparse=True):
+        """What is sparse has constraints as they are at this moment. What is dense has their change, but loads and shapes of elastic bodies as they are. rates: of the motions that are asked
+        for, 1/s, or a function that gives them, which costs as much as all modes"""
+        if self._steadiness is None:
+            self._steadiness = self._core.steadiness()
+        now = self._steadiness
+        if now["turning"]:
+            warnings.warn("%s: body %s turns relative to the axes of the linearization at t = %g, and small motions are others: its modal coordinates are in its own axes. Take the linearization from "
+                          "there, linearize(axes=body)" % (call, now["turning"], self._time), RuntimeWarning, 3)
+            return
+        if not now["change" if sparse else "elastic_change"]:
+            return
+        own = now["square_rate"]  # a motion that nothing drives back has no rate of its own: the scene's counts
+        squares = [x if x > 1e-4 * own else own for x in (abs(rate)**2 for rate in (rates() if callable(rates) else rates))]
+        square = min((x for x in squares if x), default=0.)
+        limit = 1e-3 * square
+        if not square or now["change" if sparse else "elastic_change"] <= limit:
+            return
+        elastic = now["elastic_change"] > limit
+        body, change = (now["elastic"], now["elastic_change"]) if elastic else (now["body"], now["change"])
+        advice = [] if elastic else ["take state_space() or modes() without a count, which are of any state of rigid bodies"]
+        if now["spin"]:
+            advice += ["let what vibrates in the turning scene come to rest by a run with damping, and linearize there", "bring the run to equilibrium by Run.equilibrium(), which stops what turns"]
+        else:
+            advice.append("bring the run to equilibrium by Run.equilibrium()")
+        text = "; or ".join(advice + ["name the body from which the motion is steady, linearize(axes=)"])
+        warnings.warn("%s: the state at t = %g is neither in equilibrium nor steady as seen from the axes of the linearization, and small motions are others: accelerations move %s %s by "
+                      "%.2g of the scene's size, or turn it by as many radians, within 1 rad of a motion of %.3g rad per unit of time. %s"
+                      % (call, self._time, "elastic body" if elastic else "body", body, change / square, square**0.5, text[0].upper() + text[1:]), RuntimeWarning, 3)
 
     def modes(self, count=None, shift=1.):
         """Natural modes, a list of `Mode` by increasing abs(value): all modes by dense algebra, for scenes of up to 1000 unknowns; or the `count`
         slowest ones by SLEPc with the real shift `shift` (1/s)."""
         if count is None:
-            return self._core.modes()
+            found = self._core.modes()
+            self._warn_if_unsteady("modes()", [mode.value for mode in found], sparse=False)
+            return found
         from . import flexible
 
         if isinstance(count, (bool, np.bool_)) or not hasattr(count, "__index__"):
@@ -330,7 +327,9 @@ class Linearization:
         for name, given, example in (("inputs", inputs, "[Excitation.force(marker, vector)]"), ("outputs", outputs, '[hhtdae.displacement(marker, "x")]')):
             if isinstance(given, (Excitation, Measure, str)) or not np.iterable(given):
                 raise TypeError("state_space(): %s is %r, must be a list, as %s" % (name, given, example))
-        return StateSpace(*self._core.state_space([_excitation(e) for e in inputs], [_measure(m) for m in outputs]))
+        found = StateSpace(*self._core.state_space([_excitation(e) for e in inputs], [_measure(m) for m in outputs]))
+        self._warn_if_unsteady("state_space()", lambda: np.linalg.eigvals(found.A), sparse=False)
+        return found
 
     def operators(self):
         """M, C, K as petsc4py matrices, a row and column for each unknown of the scene."""

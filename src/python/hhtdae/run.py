@@ -428,8 +428,8 @@ class Run(Channels):
 
     def linearize(self, time: Any = None, axes: Any = None) -> Linearization:
         """Small motions about the state at a time of the last step: an equilibrium, a state at rest without accelerations, or a motion that is
-        steady relative to the body `axes`, to flexible bodies or to space. In any other state only `modes()` and `state_space()` are valid, see
-        `Linearization`. Collective."""
+        steady relative to the body `axes`, to flexible bodies or to space. In any other state of rigid bodies only `modes()` and `state_space()`
+        are valid: see `Linearization`, also for how a spinning elastic body comes to a steady state. Collective."""
         return Linearization(self, time, axes)
 
     # ---- the rest ----

@@ -146,8 +146,6 @@ class Scene:
         self._channels = []
         self._parameters = {}
         self._states = self._bodies = self._elements = self._variables = 0
-        self._moving = []  # numbers of bodies in the scene, and whether they are flexible
-        self._gravity = (0., 0., 0.)
         self._begun = False  # whether anything but parameters has been described
         self._edits = 0  # number of calls that have described something
         self._constraints_jump = False  # whether positions that satisfy the constraints depend on parameters
@@ -210,7 +208,6 @@ class Scene:
         if described:
             acceleration = copied(acceleration)
         self._core.gravity(self._later(lambda: plain(acceleration)) if described else acceleration)
-        self._gravity = acceleration
 
     def ground_acceleration(self, x=0., y=0., z=0.) -> None:
         """Base excitation: the ground's acceleration along the space axes, functions of time. All coordinates are relative to the ground."""
@@ -299,9 +296,7 @@ class Scene:
         for body, enter in ((RigidBody, self._core.rigid_body), (PointMass, self._core.point_mass), (FlexibleBody, self._core.flexible_body)):
             if issubclass(kind, body):
                 self._bodies += 1
-                added = Body(self, enter(name, given), name)
-                self._moving.append((added._id, name, body is FlexibleBody))
-                return added
+                return Body(self, enter(name, given), name)
         known = next((c.__name__ for c in kind.__mro__ if c.__name__ in ELEMENTS), None)
         if known is None:
             raise TypeError("Scene.add(%r): a %s is no body, joint, motion or force" % (name, kind.__name__))
