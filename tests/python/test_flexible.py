@@ -352,10 +352,12 @@ class Beam(unittest.TestCase):
             scene = h.Scene()
             b = flexible.FullFeBody(scene, "beam", self.model, flexible.FullBody(attachments=attachments)) if whole else scene.add("beam", h.FlexibleBody(stiffening.modal()))
             scene.add("clamp", h.Fixed(b.attachment("root").marker(), scene.ground.marker()))
-            scene.add("load", h.UserForce(b.attachment("tip").marker(), force=(tension, 0, 0)))
+            tip = b.attachment("tip").marker()
+            scene.add("load", h.UserForce(tip, force=(tension, 0, 0)))
             start, still = scene.run().linearize(), scene.run().equilibrium().linearize()
             slowest = []
             self.assertRegex(" ".join(self.told(lambda: slowest.extend(start.modes(1)))), r"modes\(count\): the state.*elastic body beam.*Bring the run to equilibrium by Run.equilibrium\(\);")
+            self.assertEqual(len(self.told(lambda: start.response(h.Excitation.force(tip, (0, 0, 1)), h.displacement(tip, "z"), [0., 100.]))), 1)
             if not whole:
                 self.assertRegex(" ".join(self.told(start.modes)), r"modes\(\): the state.*elastic body beam")
             self.assertEqual(self.told(lambda: slowest.extend(still.modes(1))), [])
