@@ -239,7 +239,7 @@ TEST_F(SolverState, DamagedBytes)
     LinearChoice of;
     archive      = Archive();
     archive.data = good;
-    const std::size_t at = below(k % 2 ? good.size() : std::min<std::size_t>(good.size(), 6000)); /* the part with the division into nodes, or anywhere */
+    const std::size_t at = below(k % 2 ? good.size() : std::min<std::size_t>(good.size(), 6000)); /* in the division into nodes, or anywhere */
     if (k % 8 == 0) archive.data.resize(at);
     else archive.data[at] = (char)(k % 3 ? archive.data[at] ^ (1 << below(8)) : (int)below(256));
     load(KSPCG, 1e-6, &of);

@@ -1,4 +1,4 @@
-/* Matrices of the tests of linear solvers over all ranks */
+/* Distributed matrices for the tests of linear solvers */
 #ifndef HHTDAE_TEST_DISTRIBUTED_MATRIX_H
 #define HHTDAE_TEST_DISTRIBUTED_MATRIX_H
 
@@ -8,7 +8,7 @@
 namespace hhtest
 {
 
-/* Rows begin to end - 1 on this rank */
+/* This rank has the rows begin to end - 1 */
 inline Mat distributed(const Triplets &e, PetscInt begin, PetscInt end)
 {
   Mat                      A;
@@ -28,7 +28,7 @@ inline Mat distributed(const Triplets &e, PetscInt begin, PetscInt end)
   return A;
 }
 
-/* All rows but few on the first ranks, so that one of three has next to nothing */
+/* Almost all rows on the first ranks, so that one of three ranks has almost none */
 inline Mat distributed(const Triplets &e)
 {
   PetscMPIInt rank, size;

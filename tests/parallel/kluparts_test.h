@@ -1,4 +1,4 @@
-/* A matrix of anything, divided among the ranks as told, with the solver type "kluparts", and what it is compared with */
+/* A matrix distributed over the ranks in a given way, with the solver type "kluparts", and references for it */
 #ifndef HHTDAE_TESTS_KLUPARTS_TEST_H
 #define HHTDAE_TESTS_KLUPARTS_TEST_H
 
@@ -34,7 +34,7 @@ inline int rank()
 
 typedef std::vector<int> Owners;
 
-/* Pieces of equal length along a walk through the graph, breadth first: cuts across chains and nets */
+/* Pieces of equal length along a breadth-first walk through the graph: cuts across chains and nets */
 inline Owners pieces(const Triplets &e, int count)
 {
   std::vector<std::vector<PetscInt>> neighbours(e.n);
@@ -58,7 +58,7 @@ inline Owners pieces(const Triplets &e, int count)
   return owner;
 }
 
-/* Anything anywhere: much interface */
+/* Unknowns distributed at random: a large interface */
 inline Owners scattered(const Triplets &e, int count)
 {
   std::mt19937 random(7);
@@ -67,7 +67,7 @@ inline Owners scattered(const Triplets &e, int count)
   return owner;
 }
 
-/* Knots that are point masses, rods with three multipliers at either end: rows x columns closed loops */
+/* Knots that are point masses, connected by rods with three multipliers at each end: rows x columns closed loops */
 inline Triplets net(PetscInt rows, PetscInt columns)
 {
   Triplets                               e;
@@ -123,7 +123,7 @@ inline Triplets saddle(PetscInt n, PetscInt m, unsigned seed)
   return e;
 }
 
-/* Other values on either side of the diagonal */
+/* With different values on the two sides of the diagonal */
 inline Triplets unsymmetric(Triplets e)
 {
   std::mt19937                           random(11);
@@ -139,7 +139,7 @@ class System
 public:
   Mat                   A   = nullptr;
   KSP                   ksp = nullptr;
-  std::vector<PetscInt> place; /* of every unknown in the numbers of the distributed matrix */
+  std::vector<PetscInt> place; /* number of every unknown in the distributed matrix */
   PetscInt              n;
 
   System(const Triplets &e, const Owners &owner, const char *package = LINEAR_KLUPARTS) : place(e.n), n(e.n)
@@ -173,14 +173,14 @@ public:
     must(KSPSetOperators(ksp, A, A));
   }
 
-  /* Other values in the same pattern */
+  /* Sets other values in the same pattern */
   void values(const Triplets &e)
   {
     must(MatSetValuesCOO(A, own(e).val.data(), INSERT_VALUES));
     must(KSPSetOperators(ksp, A, A));
   }
 
-  /* For the right-hand side of entries between -1 and 1; in the numbers of the entries, on every rank */
+  /* Solves for a right-hand side with entries between -1 and 1; the result is in the numbering of the entries, on every rank */
   Array solve()
   {
     Vec b, x;
@@ -204,7 +204,7 @@ public:
     return F;
   }
 
-  /* What the factor prints, on the first rank */
+  /* The text that the factor prints, on the first rank */
   std::string view()
   {
     Printed     printed;
@@ -257,7 +257,7 @@ private:
   }
 };
 
-/* Largest residual of a row relative to the terms that it sums up */
+/* Largest residual of a row relative to the terms of its sum */
 inline double residual(const Triplets &e, const Array &x)
 {
   Array left(e.n), size(e.n);
@@ -274,7 +274,7 @@ inline double residual(const Triplets &e, const Array &x)
   return r;
 }
 
-/* The same system on every rank alone */
+/* Solves the same system on each rank alone */
 inline Array alone(const Triplets &e)
 {
   Mat A;
@@ -299,7 +299,8 @@ inline Array alone(const Triplets &e)
   return result;
 }
 
-/* Against one rank alone; against MUMPS, too, where asked for: it talks much where cores are few */
+/* Compares with the solution on one rank, and with MUMPS if asked for, which is slow on few cores because it
+   communicates much */
 inline void compare(const char *what, const Triplets &e, const Owners &owner, bool mumps = false)
 {
   System       s(e, owner);
@@ -323,7 +324,7 @@ inline MatFactorError factorError(System &s)
   return error;
 }
 
-/* The same on all ranks */
+/* Whether all ranks have the same value */
 inline bool agreed(int value)
 {
   int both[2] = {value, -value};

@@ -13,7 +13,7 @@
 namespace hhtest
 {
 
-/* The same name on all ranks, and one file, which rank 0 removes. Collective. */
+/* A file with the same name on all ranks, removed by rank 0. Collective */
 struct SharedFile {
   std::string name;
   explicit SharedFile(const std::string &end)

@@ -1,4 +1,4 @@
-/* Users' constraints, stops and analyses between bodies of several ranks are those of one. */
+/* User constraints, stops and analyses between bodies of several ranks give the results of one rank */
 #include "hhtdae/analyses.h"
 #include "hhtdae/query.h"
 #include "scene_output.h"
@@ -9,7 +9,8 @@ using namespace hhtest;
 namespace
 {
 
-/* A chain whose tips 2 and 7 depend on each other and on the time, and 9 rises twice as fast as 0; a stop and a rope */
+/* A chain in which the tips 2 and 7 depend on each other and on time, and tip 9 rises twice as fast as tip 0; with a
+   stop and a rope */
 struct Chain : Rods {
   Element circle, rope, stop;
 
@@ -75,7 +76,8 @@ TEST(AnalysesRanks, TheSameAnswers)
   for (std::size_t k = 0; k < one.size(); k++) EXPECT_NEAR(one[k], all[k], 1e-6 * std::max(1., std::abs(one[k]))) << k;
 }
 
-/* Forty rods of 1/40 m and 2 kg in all, pulled along x by 30 N: in equilibrium rod k hangs by the weights from it on over the pull */
+/* Forty rods of 1/40 m with a total mass of 2 kg, pulled along x by 30 N: in equilibrium the slope of rod k is the
+   weight from it to the end over the pull */
 TEST(AnalysesRanks, HangingChain)
 {
   const int    n = 40;

@@ -1,5 +1,4 @@
-/* A change of coordinates on all ranks together and on every rank alone: the angles of one body are spread over the
- * ranks */
+/* A change of coordinates on all ranks together and on each rank alone; the angles of one body are on several ranks */
 #include "tumbling.h"
 
 using namespace hhtest;

@@ -1,4 +1,5 @@
-/* Checkpoints on several ranks: the run that writes is not changed, the one that resumes repeats it bit for bit, another number of ranks is refused */
+/* Checkpoints on several ranks: writing does not change the run, a resumed run repeats it bit for bit, and another
+   number of ranks is refused */
 #include "hhtdae/scene.h"
 #include "scene_output.h"
 #include "shared_file.h"
@@ -13,7 +14,7 @@ struct Fallen {
   TSHHT3Statistics s;
 };
 
-/* In each step, so that what the solver of samples keeps matters */
+/* In each step, so that the state of the samples' solver matters */
 struct Samples {
   Vec       A     = nullptr;
   PetscReal begin = -1;

@@ -1,4 +1,5 @@
-/* The preconditioner "hhtconstraint" over all ranks: products in single precision, its coarse level, a matrix whose values change */
+/* The preconditioner "hhtconstraint" on several ranks: products in single precision, coarse level, matrices with
+   changing values */
 #include "distributed_matrix.h"
 #include "linear/constraint.h"
 #include "linear/matrix_nodes.h"
@@ -11,7 +12,7 @@ using namespace hhtest;
 namespace
 {
 
-/* A clamped bar of nodes, each of one rank, with multipliers on the last one */
+/* A clamped bar whose nodes are on one rank each, with multipliers on the last rank */
 class ConstraintRanks : public testing::Test
 {
 protected:
@@ -75,7 +76,7 @@ protected:
     must(KSPGetPC(ksp, &pc));
     must(PCSetType(pc, PCHHTCONSTRAINT));
   }
-  /* iterations, and the error of the answer that is known */
+  /* returns the number of iterations, and the error of the known solution */
   PetscInt solve(PetscReal *error)
   {
     PetscInt  its;
@@ -110,7 +111,8 @@ TEST_F(ConstraintRanks, ProductAgreesWithTheMatrix)
   must(NodeProductDestroy(&p));
 }
 
-/* With new values as many iterations as a solver that never saw the old ones: every rank's own copy of the coarse matrix follows */
+/* With new values the number of iterations is that of a solver that has never seen the old ones: each rank's copy of
+   the coarse matrix is updated */
 TEST_F(ConstraintRanks, FollowsTheMatrix)
 {
   PetscReal error;
@@ -137,7 +139,7 @@ TEST_F(ConstraintRanks, FollowsTheMatrix)
   must(PetscOptionsClearValue(nullptr, "-pc_hhtconstraint_aggregate"));
 }
 
-/* Corrections by loose solves reach the accuracy of double precision */
+/* Repeated corrections by inaccurate solves reach double precision */
 TEST_F(ConstraintRanks, RefinesLooseSolves)
 {
   PetscReal error = 1;

@@ -1,4 +1,4 @@
-/* What cannot be factored on one rank is known on all: nobody waits for ever, and the message is the same */
+/* If a factorization fails on one rank, all ranks know it: none waits, and the message is the same */
 #include "support.h"
 
 using namespace hhtest;
@@ -6,7 +6,8 @@ using namespace hhtest;
 namespace
 {
 
-/* Independent oscillators, of which the last loses its inertia and its spring for a while: only the last rank's block is singular */
+/* Independent oscillators of which the last loses its inertia and its spring for some time: only the block on the last
+   rank is singular */
 struct Fading : Oscillators {
   const double from, to;
   Fading(double begin, double end) : Oscillators({1., 2., 1.5, 3.}, {.1, .1, .1, .1}, false, 1.), from(begin), to(end) {}
@@ -48,7 +49,7 @@ TEST(ParallelFactorErrors, ABlockOfOneRankAtTheStart)
   EXPECT_TRUE(trap.says("No consistent accelerations")) << trap.message;
 }
 
-/* One matrix over both ranks, which every package of ours reports on all of them */
+/* One matrix over all ranks, whose singularity each of our packages reports on all ranks */
 TEST(ParallelFactorErrors, OneMatrixOverAllRanks)
 {
   for (const char *package : {"", "-pc_factor_mat_solver_type mumps ", "-pc_factor_mat_solver_type kluparts ", "-pc_factor_mat_solver_type mumpsnd ",

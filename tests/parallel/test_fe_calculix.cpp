@@ -25,7 +25,7 @@ int rankOf(MPI_Comm comm)
   return rank;
 }
 
-/* A folder that all ranks know, and rank 0's files in it */
+/* A folder known to all ranks, with files written by rank 0 */
 class Job
 {
 public:
@@ -51,7 +51,7 @@ public:
   }
   Job(const Job &) = delete;
 
-  /* Collective: the others read when rank 0 has written */
+  /* Collective: the other ranks read after rank 0 has written */
   void write(const std::string &end, const std::string &text) const
   {
     MPI_Barrier(PETSC_COMM_WORLD);
@@ -65,7 +65,7 @@ public:
     all << in.rdbuf();
     return all.str();
   }
-  /* Rank 0 runs ccx; false on all ranks if there is none */
+  /* Rank 0 runs ccx; false on all ranks if it is not installed */
   bool ccx() const
   {
     int good = 1;
@@ -124,7 +124,7 @@ std::string deckOf(const FeModel &model)
   return deck.str();
 }
 
-/* Row 3 n + c of the model is row `stored` of the files: nodes backwards, so that rows are renumbered */
+/* Row 3 n + c of the model is row `stored` of the files: nodes in reverse order, so that rows must be renumbered */
 PetscInt stored(const FeModel &model, PetscInt row) { return 3 * (model.nodes - 1 - row / 3) + row % 3; }
 
 std::string unknownsOf(const FeModel &model)
@@ -141,7 +141,7 @@ std::string matrixOf(const FeModel &model, Mat A)
   std::ostringstream out;
   out << std::setprecision(17);
   for (PetscInt j = 0; j < 3 * model.nodes; j++) {
-    const PetscInt                column = stored(model, j); /* its own inverse */
+    const PetscInt                column = stored(model, j); /* the map is its own inverse */
     PetscInt                      count;
     const PetscInt               *with;
     const PetscScalar            *value;
@@ -163,7 +163,7 @@ void writeJob(const Job &job, const FeModel &model)
   job.write(".mas", matrixOf(model, model.M));
 }
 
-/* Own rows of A against the same rows of B, which one rank has alone: equal to the last bit */
+/* This rank's rows of A equal those of B, which one rank has alone, to the last bit */
 void expectRows(const FeModel &all, Mat A, const FeModel &alone, Mat B)
 {
   PetscInt begin, end, different = 0;
@@ -193,7 +193,7 @@ void expectSameModel(const FeModel &all, const FeModel &alone)
   MPI_Comm_size(all.comm, &size);
   ASSERT_EQ(all.nodes, alone.nodes);
   ASSERT_EQ(alone.own, alone.nodes);
-  /* contiguous ranges, one after the other, that differ by a node at most */
+  /* contiguous ranges whose sizes differ by at most one node */
   EXPECT_GE(all.own, all.nodes / size);
   EXPECT_LE(all.own, all.nodes / size + 1);
   PetscInt before = 0;
@@ -244,7 +244,7 @@ double frequencyOff(const ReducedBody &a, const ReducedBody &b)
   return (a.modal.omega - b.modal.omega).cwiseQuotient(b.modal.omega).cwiseAbs().maxCoeff();
 }
 
-/* Largest difference of own rows from those of one rank, over all ranks and relative to the largest row */
+/* Largest difference of this rank's rows from those of one rank, over all ranks and relative to the largest row */
 double rowsOff(MPI_Comm comm, const Eigen::MatrixXd &own, const Eigen::MatrixXd &whole, Eigen::Index first)
 {
   double worst = own.size() ? (own - whole.middleRows(first, own.rows())).cwiseAbs().maxCoeff() : 0;
@@ -252,7 +252,7 @@ double rowsOff(MPI_Comm comm, const Eigen::MatrixXd &own, const Eigen::MatrixXd 
   return worst / whole.cwiseAbs().maxCoeff();
 }
 
-/* Read and reduced on all ranks together and on every rank alone */
+/* Reads and reduces the model on all ranks together and on each rank alone */
 void compare(const std::string &stem, ReducedBody *body)
 {
   FeModel all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
@@ -278,7 +278,7 @@ void compare(const std::string &stem, ReducedBody *body)
   EXPECT_LT(stress, 1e-6);
 }
 
-/* The message, which has to be the same on every rank */
+/* The error message, which must be the same on every rank */
 std::string refused(const std::string &stem)
 {
   FeModel   model(PETSC_COMM_WORLD);
@@ -286,7 +286,7 @@ std::string refused(const std::string &stem)
   const int code     = (int)model.readCalculix(stem);
   int       codes[2] = {code, -code}, size;
   EXPECT_NE(code, 0);
-  /* all ranks are here again, with the same error */
+  /* all ranks get here, with the same error */
   MPI_Allreduce(MPI_IN_PLACE, codes, 2, MPI_INT, MPI_MAX, PETSC_COMM_WORLD);
   EXPECT_EQ(codes[0], -codes[1]);
   MPI_Comm_size(PETSC_COMM_WORLD, &size);
@@ -308,7 +308,7 @@ TEST(CalculixRanks, SameAsOnOneRank)
   ReducedBody read, direct;
   writeJob(job, made.model);
   compare(job.stem, &read);
-  /* the files have all digits: the model is the one that was written */
+  /* the files have all digits, so that the model is the one that was written */
   must(Reduce(made.model, reductionOf(), &direct));
   EXPECT_LT(frequencyOff(read, direct), 1e-10);
 }
@@ -331,7 +331,7 @@ TEST(CalculixRanks, FilesOfCcx)
   EXPECT_LT(off, 1e-6); /* 14 digits */
 }
 
-/* Ranks without a node */
+/* Some ranks have no node */
 TEST(CalculixRanks, FewNodes)
 {
   Job  job;
@@ -364,7 +364,7 @@ TEST(CalculixRanks, ErrorsOnAllRanks)
   EXPECT_SAYS(damaged(".dof", dof.substr(0, dof.rfind('\n', end_of_node) + 1), dof), "has no unknown in direction");
   EXPECT_SAYS(damaged(".dof", dof.substr(0, end_of_node + 1), dof), "is not \"node.direction\"");
   EXPECT_SAYS(damaged(".dof", "", dof), "has no unknowns");
-  /* what one rank sees alone: at the end, at the beginning, in the middle of the file */
+  /* errors that only one rank sees: at the end, at the beginning, in the middle of the file */
   EXPECT_SAYS(damaged(".sti", sti + "1 2 nan\n", sti), "not a finite number");
   EXPECT_SAYS(damaged(".sti", "1 1 hello\n" + sti, sti), "is not \"row column value\"");
   const std::size_t middle = mas.find('\n', mas.size() / 2) + 1;
@@ -373,7 +373,7 @@ TEST(CalculixRanks, ErrorsOnAllRanks)
   EXPECT_SAYS(damaged(".mas", mas.substr(0, mas.size() - 3), mas), "box.mas ends within a line");
   EXPECT_SAYS(damaged(".mas", "", mas), "box.mas: it is empty");
   EXPECT_SAYS(refused(job.stem + "none"), "there is no such file");
-  /* all is good again */
+  /* with the right files everything works again */
   FeModel model(PETSC_COMM_WORLD);
   must(model.readCalculix(job.stem));
   EXPECT_EQ(model.nodes, made.model.nodes);

@@ -1,4 +1,4 @@
-/* A mesh is the same model on any number of ranks: nodes by label, sets, K and M, stress; errors come to all ranks. */
+/* A mesh gives the same model on any number of ranks: nodes by label, sets, K and M, stress; errors reach all ranks */
 #include "fe_mesh.h"
 #include "flexible/partitioner.h"
 
@@ -17,7 +17,7 @@ Vector3 wave(const Vector3 &x) { return {std::sin(3 * x[0] + x[1]), x[0] * x[2] 
 
 Vector3 bent(const Vector3 &x) { return x + Vector3(.05 * std::sin(3 * x[1]), .04 * x[0] * x[2], .06 * x[0] * x[0]); }
 
-/* Rows of `width` numbers of every node of all ranks, by label */
+/* For every node of all ranks, by label, an array of `width` numbers */
 using ByLabel = std::map<PetscInt, Array>;
 
 ByLabel byLabel(const FeModel &model, const double *values, int width)
@@ -84,7 +84,7 @@ ByLabel members(const FeModel &model, const std::string &name)
 ByLabel stressOf(const FeModel &model)
 {
   ReducedBody body;
-  body.modal.omega = Eigen::VectorXd::Ones(18); /* more than go together */
+  body.modal.omega = Eigen::VectorXd::Ones(18); /* more modes than are processed together */
   body.shape.resize(3 * model.own, 18);
   for (int k = 0; k < 18; k++)
     for (PetscInt n = 0; n < model.own; n++)
@@ -138,7 +138,7 @@ TEST_P(FeMeshParallel, SameAsOnOneRank)
     must(readBox(all, box, two, four));
     must(readBox(alone, box, two, four));
     compare(all, alone);
-    /* each rank has its part */
+    /* each rank has its own part */
     PetscMPIInt size;
     MPI_Comm_size(PETSC_COMM_WORLD, &size);
     EXPECT_GT((double)all.elements.size(), .6 * (double)alone.elements.size() / size);
@@ -146,7 +146,7 @@ TEST_P(FeMeshParallel, SameAsOnOneRank)
   }
 }
 
-/* A user's choice of partitioner holds */
+/* A partitioner chosen by the user is used */
 TEST(FeMeshParallelOptions, OtherPartitioner)
 {
   MeshBox     box{ElementType::Tetrahedron10, 6, 3, 3, 2, 1, 1, true, bent};
@@ -172,7 +172,7 @@ TEST(FeMeshParallelOptions, MetisIsAType)
   must(PetscPartitionerDestroy(&partitioner));
 }
 
-/* A row of cells is cut into pieces: METIS has each rank's next to each other */
+/* A row of cells is partitioned: METIS gives each rank cells next to each other */
 TEST(FeMeshParallelOptions, MetisCutsFewFaces)
 {
   PetscMPIInt size, rank;
@@ -180,7 +180,7 @@ TEST(FeMeshParallelOptions, MetisCutsFewFaces)
   MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
   const PetscInt        cells = 120, from = cells * rank / size, to = cells * (rank + 1) / size;
   std::vector<PetscInt> start{0}, adjacent, part;
-  /* cells stand in the row in another order than that of their numbers */
+  /* the order of the cells in the row differs from that of their numbers */
   const auto cellAt  = [&](PetscInt p) { return 7 * p % cells; };
   const auto placeOf = [&](PetscInt c) { return 103 * c % cells; }; /* 7 * 103 = 1 modulo 120 */
   for (PetscInt c = from; c < to; c++) {
@@ -198,7 +198,7 @@ TEST(FeMeshParallelOptions, MetisCutsFewFaces)
     count[all[p]]++;
     if (p && all[p] != all[p - 1]) cut++;
   }
-  EXPECT_LE(cut, size); /* size - 1 at best */
+  EXPECT_LE(cut, size); /* size - 1 is optimal */
   for (int r = 0; r < size; r++) EXPECT_NEAR(count[r], cells / size, .1 * cells / size);
 }
 
@@ -227,9 +227,9 @@ TEST(FeMeshParallelErrors, ComeToAllRanks)
     EXPECT_NE(readText(model, t), 0);
     PetscMPIInt rank;
     MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-    /* PETSc gives the text of a collective error to the first rank */
+    /* PETSc gives the text of a collective error to the first rank only */
     EXPECT_TRUE(rank || trap.says(says)) << trap.message;
-    /* all ranks are here again */
+    /* all ranks get here */
     int one = 1, sum, size;
     MPI_Comm_size(PETSC_COMM_WORLD, &size);
     MPI_Allreduce(&one, &sum, 1, MPI_INT, MPI_SUM, PETSC_COMM_WORLD);

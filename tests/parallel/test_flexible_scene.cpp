@@ -1,4 +1,4 @@
-/* Flexible bodies on several ranks: joined with each other and with rigid ones across ranks, the same as on one. */
+/* Flexible bodies on several ranks, connected to each other and to rigid ones across ranks: the same results as on one rank */
 #include "hhtdae/scene.h"
 #include "modal_cloud.h"
 #include "scene/model.h"
@@ -10,7 +10,7 @@ using namespace hhtest;
 namespace
 {
 
-/* A hanging chain of flexible and rigid links in turn */
+/* A suspended chain of alternately flexible and rigid links */
 Array runChain(MPI_Comm comm)
 {
   Scene scene(comm);
@@ -50,7 +50,8 @@ Array runChain(MPI_Comm comm)
   return x;
 }
 
-/* Flexible bodies joined at their attachments to one another, with dampers, and measures of velocities and accelerations between them */
+/* Flexible bodies connected at their attachments, with dampers between them that depend on measured velocities and
+   accelerations */
 struct Ring {
   Scene scene;
 
@@ -86,7 +87,8 @@ struct Ring {
   }
 };
 
-/* Numbers of the residual and the matrix that do not depend on the order of the unknowns, in a state that does not either */
+/* Numbers derived from the residual and the matrix that do not depend on the order of the unknowns, at a state that
+   does not depend on it either */
 Array numbers(MPI_Comm comm)
 {
   Ring   ring(comm);

@@ -1,4 +1,4 @@
-/* A finite-element model in a scene on several ranks: the same as on one. */
+/* A whole finite-element model in a scene on several ranks: the same results as on one rank */
 #include "box_model.h"
 #include "hhtdae/flexible.h"
 #include "hhtdae/linearize.h"
@@ -38,7 +38,8 @@ Array runBeam(MPI_Comm comm, FeLaw law, const std::string &options = "")
   return x;
 }
 
-/* A beam with a load at its tip, held by a clamp or a hinge: displacement of the tip, force of the joint, motion of what is held */
+/* A beam with a load at its tip, held by a clamp or a hinge: displacement of the tip, force of the joint, motion of
+   the held attachment */
 Array runHeld(MPI_Comm comm, bool clamp, double young, const std::string &options, PetscReal *null_pivot)
 {
   const double end = 0.05 * std::sqrt(2e6 / young);
@@ -79,7 +80,8 @@ Array runHeld(MPI_Comm comm, bool clamp, double young, const std::string &option
 
 } // namespace
 
-/* Pivots that change place take more room than MUMPS has estimated: with PETSc's own interface it ends in INFOG(1)=-9 on two ranks */
+/* Pivots that change their places need more memory than MUMPS has estimated: with PETSc's interface this ends with
+   INFOG(1)=-9 on two ranks */
 TEST(FullBodyRanks, SlowestModes)
 {
   std::vector<Mode> modes[2];
@@ -103,7 +105,8 @@ TEST(FullBodyRanks, SlowestModes)
   for (int i = 0; i < 6; i++) EXPECT_NEAR(modes[1][i].frequency(), modes[0][i].frequency(), 1e-6 * modes[0][i].frequency());
 }
 
-/* Nodes were read at places of other ranks: random positions, or a scene said to be singular */
+/* The model was read on other ranks than the scene's. Nodes were once looked up at positions of other ranks, which
+   gave random positions or a scene reported as singular */
 TEST(FullBodyRanks, ModelOfOtherRanksThanTheScene)
 {
   PetscMPIInt size;
@@ -127,11 +130,12 @@ TEST(FullBodyRanks, SameAsOnOne)
     const Array all = runBeam(PETSC_COMM_WORLD, law), one = runBeam(PETSC_COMM_SELF, law);
     ASSERT_EQ(all.size(), one.size());
     for (std::size_t k = 0; k < one.size(); k++) EXPECT_NEAR(all[k], one[k], 1e-10) << "channel " << k;
-    EXPECT_LT(one[2], 0.1 - 1e-4); /* it sags */
+    EXPECT_LT(one[2], 0.1 - 1e-4); /* it bends */
   }
 }
 
-/* Conjugate gradients behind the constraint preconditioner with its coarse level: the same within what the corrector leaves */
+/* Conjugate gradients with the constraint preconditioner and its coarse level: the same results up to the corrector's
+   tolerance */
 TEST(FullBodyRanks, ByConjugateGradients)
 {
   for (FeLaw law : {FeLaw::Small, FeLaw::Large}) {
@@ -141,7 +145,8 @@ TEST(FullBodyRanks, ByConjugateGradients)
   }
 }
 
-/* No room for the factor of a thick body, which would be MUMPS' by default: conjugate gradients, unless the user asks for a factor */
+/* Without memory for the factorization of a thick body, by default that of MUMPS, conjugate gradients are used, unless
+   the user requests a factorization */
 TEST(FullBodyRanks, WithoutRoomForAFactor)
 {
   const auto runBlock = [](const std::string &options, bool iterative) {
@@ -174,21 +179,22 @@ TEST(FullBodyRanks, WithoutRoomForAFactor)
     return x[0];
   };
   const double factored = runBlock("", false), without = runBlock("-mat_mumps_memory 1 ", true);
-  EXPECT_LT(factored, 0.5 - 1e-4); /* it sags */
+  EXPECT_LT(factored, 0.5 - 1e-4); /* it bends */
   EXPECT_NEAR(without, factored, 1e-8);
   ErrorTrap trap;
   EXPECT_ANY_THROW(runBlock("-mat_mumps_memory 1 -pc_type cholesky -pc_factor_mat_solver_type mumpsnd ", false));
   EXPECT_TRUE(trap.says("not enough memory")) << trap.message;
 }
 
-/* Factors in single precision: constraints hold to a tenth of the corrector's tolerance of 1e-11 m (what is left depends on the order in which MUMPS' messages come:
-   up to 4e-14 m was seen), and reactions differ by what the corrector leaves of them */
+/* Factorizations in single precision: constraints are satisfied to a tenth of the corrector's tolerance of 1e-11 m
+   (the rest depends on the order in which MUMPS' messages arrive: up to 4e-14 m was seen), and reactions differ by
+   what the corrector leaves of them */
 TEST(FullBodyRanks, InSinglePrecision)
 {
   const std::string package = "-pc_factor_mat_solver_type ";
   for (bool clamp : {true, false})
     for (double young : {2e6, 2e11}) {
-      PetscReal   in_double, in_single; /* tell which of the two was in use at the end */
+      PetscReal   in_double, in_single; /* these statistics tell which of the two was in use at the end */
       const Array d = runHeld(PETSC_COMM_SELF, clamp, young, package + "mumpsnd ", &in_double), s = runHeld(PETSC_COMM_WORLD, clamp, young, package + "mumpsmixed ", &in_single);
       EXPECT_LT(in_double, 1e-12);
       EXPECT_GT(in_single, 1e-8) << "it has fallen back";

@@ -1,4 +1,4 @@
-/* Whole finite-element bodies in a page, on any number of ranks: nodes where the run has them, the same as on one. */
+/* Whole finite-element bodies in a page: nodes are where the run has them, and the page is the same on any number of ranks */
 #include "box_model.h"
 #include "hhtdae/flexible.h"
 #include "scene_output.h"
@@ -12,10 +12,10 @@ namespace
 {
 
 const int     bricks[] = {6, 2, 2};
-constexpr int outer    = 7 * 3 * 3 - 5; /* nodes but for those inside */
+constexpr int outer    = 7 * 3 * 3 - 5; /* all nodes except inner ones */
 constexpr int frames = 8;
 
-/* Places of all nodes at the frames, on the first rank, as FullFeBody tells them */
+/* Positions of all nodes at the frames, on the first rank, from FullFeBody */
 struct Asked {
   FullFeBody                       fe;
   MPI_Comm                         comm;
@@ -43,7 +43,7 @@ struct Asked {
   }
 };
 
-/* A soft bar that tumbles and swings, beside a rigid body */
+/* A soft bar that tumbles and vibrates, beside a rigid body */
 Asked run(MPI_Comm comm, FeLaw law, const std::string &file)
 {
   constexpr double end = 0.02;
@@ -70,10 +70,10 @@ Asked run(MPI_Comm comm, FeLaw law, const std::string &file)
   return asked;
 }
 
-/* other, the frame of the attachment, the bar */
+/* the other body, the frame of the attachment, the bar */
 PageFile read(const TemporaryFile &file) { return PageFile(file.text(), 21, 0, {}, {{outer, true}}); }
 
-/* Nodes of the surface where the page shows them */
+/* Positions of the surface nodes in the page */
 Eigen::Matrix3Xd shown(const PageFile &page, std::size_t frame)
 {
   const std::vector<double> &track = page.track[frame];
@@ -111,8 +111,8 @@ TEST(FullPage, NodesAreWhereTheRunHasThem)
       }
       for (double d : page.moved[i]) largest = std::max(largest, std::abs(d));
     }
-    EXPECT_GT(largest, 1e-3); /* it deforms, */
-    EXPECT_LT(largest, 0.5);  /* and what it does as a whole is not in that */
+    EXPECT_GT(largest, 1e-3); /* the bar deforms, */
+    EXPECT_LT(largest, 0.5);  /* and its rigid motion is not part of the deformation */
   }
 }
 
@@ -129,7 +129,7 @@ TEST(FullPage, AsOnOneRank)
   double most = 0;
   for (std::size_t i = 0; i < a.time.size(); i++) {
     const Eigen::Matrix3Xd x = shown(a, i), y = shown(b, i);
-    for (int n = 0; n < outer; n++) { /* nodes have other numbers there */
+    for (int n = 0; n < outer; n++) { /* nodes are numbered differently there */
       Eigen::Index same;
       EXPECT_LT((y.colwise() - Eigen::Vector3d(x.col(n))).colwise().norm().minCoeff(&same), 4e-4 + a.moved_step[i] + b.moved_step[i]);
       EXPECT_NEAR(a.stress[i][(std::size_t)n], b.stress[i][(std::size_t)same], 0.01 * (b.stress[i][(std::size_t)same] + 100));

@@ -1,4 +1,5 @@
-/* Finite-element bodies solved by conjugate gradients behind "hhtconstraint": a run that is resumed in its middle repeats the uninterrupted one bit for bit, on any number of ranks */
+/* Finite-element bodies solved by conjugate gradients with "hhtconstraint": a resumed run repeats the uninterrupted
+   one bit for bit, on any number of ranks */
 #include "box_model.h"
 #include "hhtdae/flexible.h"
 #include "scene/model.h"
@@ -13,14 +14,14 @@ namespace
 struct Case {
   Box         box;
   FeLaw       law  = FeLaw::Large;
-  bool        free = false; /* a spinning flight; otherwise it hangs on a ball joint, with a load at its end */
+  bool        free = false; /* spins in free flight; otherwise it hangs on a ball joint with a load at its end */
   std::string options;
 };
 
 struct End {
   Array            u, v;
   TSHHT3Statistics s;
-  std::string      solver; /* -ksp_view */
+  std::string      solver; /* output of -ksp_view */
 };
 
 End run(const Case &c, const std::string &options)
@@ -66,7 +67,7 @@ End run(const Case &c, const std::string &options)
 
 bool has(const End &e, const char *words) { return e.solver.find(words) != std::string::npos; }
 
-/* Stopped after each of some steps and gone on with. What the solver shows at the stops and at the end, for the caller to look at. */
+/* Stops after each of some steps and resumes; returns the results and the view of the solver at the stops and at the end */
 std::vector<End> repeats(const Case &c, int steps, const std::vector<int> &stops)
 {
   SCOPED_TRACE(c.options);
@@ -117,19 +118,20 @@ TEST(FullBodyResume, ByMinimalResiduals)
   repeats({beam, FeLaw::Large, false, tolerance(1e-4) + fgmres}, 16, {9});
 }
 
-/* Without a coarse level the multipliers and what they hold are factored by the fine one */
+/* Without a coarse level the multipliers and their nodes are factored by the fine level */
 TEST(FullBodyResume, WithoutACoarseLevel)
 {
   repeats({beam, FeLaw::Large, false, tolerance(1e-4) + cg + "-pc_hhtconstraint_aggregate 0 "}, 16, {9});
 }
 
-/* A body that has turned: with the positions at the stop its nodes would be taken together in another way */
+/* A body that has rotated: with its positions at the stop the nodes would be aggregated differently */
 TEST(FullBodyResume, AfterTurns)
 {
   repeats({beam, FeLaw::Large, true, tolerance(1e-4) + cg + "-ts_adapt_type none -ts_dt 0.01 "}, 16, {10});
 }
 
-/* Rounding of products in single precision was a part of what a solve has left: they are of double precision after the stop as well */
+/* The rounding of products in single precision was part of the error of a solve, so that products changed to double
+   precision; after the stop they are in double precision as well */
 TEST(FullBodyResume, AfterProductsHaveFallenBack)
 {
   const Box              stiff{{8, 3, 2}, {2, 0.6, 0.3}, {2e11, 0.3, 1000}};
@@ -140,7 +142,7 @@ TEST(FullBodyResume, AfterProductsHaveFallenBack)
 namespace
 {
 
-/* No room for the factor of a thick body */
+/* No memory for the factorization of a thick body */
 const Case block{{{9, 9, 9}, {1, 1, 1}, {2e6, 0.3, 1000}}, FeLaw::Small, false, tolerance(1e-4)};
 
 } // namespace
@@ -155,7 +157,8 @@ TEST(FullBodyResume, ChosenForWantOfRoom)
 namespace
 {
 
-/* So large that conjugate gradients are the default, on one rank: on several its matrix is too small for that, and the factor would be one of MUMPS, which repeats runs to rounding only */
+/* So large that conjugate gradients are the default, on one rank; on several ranks the matrix is too small for that,
+   and the factorization would be one of MUMPS, which repeats runs only to rounding */
 Case large(const std::string &options)
 {
   Case c;
@@ -181,7 +184,8 @@ TEST(FullBodyResume, ChosenByDefault)
   for (const End &e : repeats(large("-ts_dt 0.001 "), 4, {2})) EXPECT_TRUE(has(e, "hhtconstraint")) << e.solver;
 }
 
-/* Conjugate gradients of many iterations make way for a factor, which the first stop finds chosen and not made yet */
+/* Conjugate gradients with many iterations are replaced by a factorization, which at the first stop has been chosen
+   but not yet made */
 TEST(FullBodyResume, AfterAFactorHasTakenTheirPlace)
 {
   if (several()) GTEST_SKIP();

@@ -1,4 +1,4 @@
-/* Kept nodes and load cases: of reductions and in scenes, on several ranks as on one. */
+/* Kept nodes and load cases in reductions and in scenes: the same on several ranks as on one */
 #include "box_model.h"
 #include "hhtdae/flexible.h"
 #include "modal_cloud.h"
@@ -33,7 +33,7 @@ double off(const Eigen::MatrixXd &a, const Eigen::MatrixXd &b)
   return a.size() && a.size() == b.size() ? (a - b).norm() / (1e-9 + b.norm()) : 0;
 }
 
-/* Two flexible bodies and a rigid one between kept nodes, with modal loads that read each other */
+/* Two flexible bodies and a rigid one connected at kept nodes, with modal loads that depend on each other */
 Array shake(MPI_Comm comm)
 {
   Scene               scene(comm);
@@ -64,7 +64,7 @@ Array shake(MPI_Comm comm)
   ContactLaw law;
   law.stiffness = 100;
   law.friction  = 0.2;
-  for (int k = 0; k < 3; k++) { /* with the next body, and with the ground */
+  for (int k = 0; k < 3; k++) { /* with the next body and with the ground */
     const Element touch = scene.add(text("touch %d", k), NodeContact{flex[k], {}, 1, k < 2 ? scene.marker(scene.attachment(flex[k + 1], "hub")) : scene.markerAt(scene.ground(), {6, 0, 0}), 1, law});
     scene.channel(text("force %d", k), Measure::force(touch, 0));
   }

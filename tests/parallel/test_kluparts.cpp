@@ -1,4 +1,4 @@
-/* The solver type "kluparts" on all ranks together: what it solves, when it keeps its pivots, when it is chosen */
+/* The solver type "kluparts" on all ranks together: solutions, when it keeps its pivots, when it is chosen */
 #include "kluparts_test.h"
 
 using namespace kluparts_test;
@@ -34,7 +34,7 @@ TEST(KluParts, RandomSaddlePoints)
   }
 }
 
-/* The interface of a chain is the multipliers of one joint per cut */
+/* The interface of a chain consists of the multipliers of one joint per cut */
 TEST(KluParts, SmallInterface)
 {
   const Triplets e = spatial_chain(300);
@@ -72,7 +72,7 @@ TEST(KluParts, RankWithoutUnknowns)
   compare("first rank empty", e, o);
 }
 
-/* Two unknowns that are coupled with everything but each other, on ranks of their own: no interior is left there */
+/* Two unknowns that are coupled with everything except each other, on ranks of their own: no interior remains there */
 TEST(KluParts, RankWithoutInterior)
 {
   Triplets e;
@@ -86,7 +86,7 @@ TEST(KluParts, RankWithoutInterior)
   compare("hubs", e, o);
 }
 
-/* Few unknowns each, down to one: coupled, or not, with the neighbours */
+/* Few unknowns on each rank, down to one: coupled with the neighbours or not */
 TEST(KluParts, FewUnknowns)
 {
   for (PetscInt n = 1; n <= 9; ++n)
@@ -134,7 +134,7 @@ TEST(KluParts, OtherPattern)
   EXPECT_LT(residual(e, s.solve()), 1e-10);
 }
 
-/* The factor itself is given a matrix with another pattern */
+/* The factor itself gets a matrix with another pattern */
 TEST(KluParts, OtherPatternWithoutAnalysis)
 {
   Triplets      e = spatial_chain(64);
@@ -175,7 +175,7 @@ static std::string chosen(const Triplets &e, const std::string &options, PetscBo
   must(KSPGetPC(ksp, &pc));
   must(KSPSetUp(ksp));
   must(PCFactorGetMatrix(pc, &F));
-  must(MatFactorGetSolverType(F, &package)); /* what the factor is, not what was asked for */
+  must(MatFactorGetSolverType(F, &package)); /* the actual type of the factor, not the requested one */
   const std::string result = package;
   must(KSPDestroy(&ksp));
   return result;

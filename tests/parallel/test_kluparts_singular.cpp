@@ -1,12 +1,12 @@
-/* "kluparts" where something is singular: what moves to its interface, and what it says of singular matrices */
+/* "kluparts" with singular interiors or matrices: what moves to its interface, and how it reports singular matrices */
 #include "kluparts_test.h"
 
 using namespace kluparts_test;
 
 /* ---- interiors that are singular though the matrix is not ---- */
 
-/* Unknown 0 is coupled with many on another rank and becomes the interface; unknown 1 has its own diagonal, and unknown
-   0. When that diagonal goes, nothing is left in the interior. */
+/* Unknown 0 is coupled with many unknowns of another rank and becomes part of the interface; unknown 1 has its own
+   diagonal and a coupling to unknown 0. If this diagonal vanishes, nothing is left in the interior */
 static Triplets withFollower(double diagonal)
 {
   Triplets e;
@@ -44,7 +44,7 @@ TEST(KluParts, SingularInteriorMovesToTheInterface)
   s.values(e);
   EXPECT_LT(residual(e, s.solve()), 1e-10);
   expectMoved(s, " 1");
-  /* and stays there */
+  /* and it stays there */
   e = withFollower(1);
   s.values(e);
   EXPECT_LT(residual(e, s.solve()), 1e-10);
@@ -62,8 +62,8 @@ TEST(KluParts, NearlySingularInteriorIsSeen)
   expectMoved(s, " 1");
 }
 
-/* Three bodies of one coordinate on a line, constraints between them and to the ground: what is left without the first
-   body has more constraints than coordinates only by its values */
+/* Three bodies of one coordinate on a line, with constraints between them and to the ground: without the first body,
+   the values (not the pattern) show that there are more constraints than coordinates */
 TEST(KluParts, DependentRowsInAnInterior)
 {
   for (const double change : {0., 1e-14}) {
@@ -71,7 +71,7 @@ TEST(KluParts, DependentRowsInAnInterior)
     e.n = 36;
     for (PetscInt i = 0; i < 34; ++i) e.add(i, i, 3.0 + 0.1 * (double)i);
     for (PetscInt i = 10; i < 34; ++i) e.add_symmetric(0, i, 0.2 + 0.01 * (double)(i % 5));
-    /* unknowns 1 and 2 are held alike by 34 and 35, which differ in unknown 0 only */
+    /* 34 and 35 constrain unknowns 1 and 2 in the same way and differ in unknown 0 only */
     for (PetscInt l = 34; l < 36; ++l) {
       e.add(l, l, 1e-3); /* so that these do not count as multipliers */
       e.add_symmetric(l, 1, 1);
@@ -95,7 +95,7 @@ TEST(KluParts, DependentRowsInAnInterior)
 
 /* ---- matrices that are singular ---- */
 
-/* A constraint twice, by another factor: between two bodies of one rank, and across a cut */
+/* A constraint that is repeated with another factor: between two bodies of one rank, and across a cut */
 static void expectSingular(PetscInt joint)
 {
   Triplets       e      = spatial_chain(60);
@@ -129,7 +129,7 @@ TEST(KluParts, SingularByItsPattern)
     if (e.row[k] == 17 || e.col[k] == 17) e.val[k] = 0;
   s.values(e);
   EXPECT_EQ(factorError(s), MAT_FACTOR_NUMERIC_ZEROPIVOT);
-  /* and regular again */
+  /* regular again */
   e = spatial_chain(20);
   s.values(e);
   EXPECT_EQ(factorError(s), MAT_FACTOR_NOERROR);

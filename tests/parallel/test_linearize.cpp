@@ -1,4 +1,4 @@
-/* Modes, shapes and responses on all ranks are those of one. */
+/* Modes, mode shapes and responses on all ranks are those of one rank */
 #include "hhtdae/linearize.h"
 #include "hhtdae/modes.h"
 #include "scene_output.h"
@@ -8,7 +8,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Phases of shapes are free where modes are nearly equal, which those of a chain are not */
+/* Phases of mode shapes are arbitrary where modes nearly coincide, which is not the case for this chain */
 std::vector<double> answers(MPI_Comm comm)
 {
   Rods                rods(10, comm);
@@ -53,7 +53,7 @@ TEST(LinearizeRanks, TheSameAnswers)
   for (std::size_t k = 0; k < one.size(); k++) EXPECT_NEAR(one[k], all[k], 1e-6 * std::max(1., std::abs(one[k]))) << k;
 }
 
-/* SLEPc's search waited for ever: one body is on one rank, and the others have no unknowns */
+/* One body is on one rank, and the other ranks have no unknowns: SLEPc's search once waited forever */
 TEST(LinearizeRanks, SlowestModesWhereRanksHaveNoUnknowns)
 {
   std::vector<Mode> modes[2];

@@ -1,4 +1,4 @@
-/* Types of matrices distributed over ranks: the same run as with MATAIJ on one */
+/* Distributed matrices of various types: the same run as with MATAIJ on one rank */
 #include "matrix_types.h"
 #include "triangle.h"
 
@@ -39,7 +39,7 @@ TEST(MatrixTypesRanks, SameRunAsWithAIJ)
   }
 }
 
-/* Rows of the matrix on other ranks than those of the solution */
+/* The rows of the matrix are distributed differently from the solution */
 TEST(MatrixTypesRanks, DistributedOtherwise)
 {
   const Pendulum p(-90., 0., 1.);

@@ -1,4 +1,5 @@
-/* Factors in single precision over all ranks: solutions that are known, and the same decision everywhere where double precision takes over */
+/* Factorizations in single precision over all ranks: known solutions, and the same decision on all ranks when double
+   precision replaces them */
 #include "distributed_matrix.h"
 #include "linear/linear.h"
 #include "linear/memory.h"
@@ -44,7 +45,7 @@ protected:
     must(KSPSetOperators(ksp, A, A));
   }
 
-  /* The answer to A times a known vector */
+  /* Solves A x = b, where x is known */
   void solve(bool transposed = false)
   {
     Vec       known, b, x;
@@ -65,7 +66,7 @@ protected:
     for (Vec *v : {&known, &b, &x}) must(VecDestroy(v));
   }
 
-  /* of A, on the last rank alone */
+  /* sets an entry of A from the last rank only */
   void setOnLast(PetscInt row, PetscInt col, double value)
   {
     PetscInt begin, end;
@@ -101,7 +102,7 @@ TEST_F(MumpsMixedRanks, Solves)
   }
 }
 
-/* Places of the solution may change with every factorization, and between A and its transpose */
+/* The distribution of the solution may change with every factorization, and between A and its transpose */
 TEST_F(MumpsMixedRanks, SolvesAfterChanges)
 {
   use("mumpsmixed", PCLU);
@@ -116,7 +117,7 @@ TEST_F(MumpsMixedRanks, SolvesAfterChanges)
   EXPECT_LT(error, 1e-12);
 }
 
-/* One entry of one rank is beyond the range of single precision */
+/* One entry on one rank is beyond the range of single precision */
 TEST_F(MumpsMixedRanks, AnEntryBeyondTheRange)
 {
   PetscInt n;
@@ -133,7 +134,7 @@ TEST_F(MumpsMixedRanks, AnEntryBeyondTheRange)
   EXPECT_LT(error, 1e-8);
 }
 
-/* Room on all ranks together, since they share a machine, and the same answer on all */
+/* Memory is counted for all ranks together, since they share a machine, and the result is the same on all */
 TEST_F(MumpsMixedRanks, NoRoom)
 {
   PetscMPIInt size;
@@ -154,7 +155,7 @@ TEST_F(MumpsMixedRanks, NoRoom)
 TEST_F(MumpsMixedRanks, Singular)
 {
   Triplets e = block(4, 4, 4, true);
-  for (PetscInt d = 0; d < 3; d++) { /* the first node is held already */
+  for (PetscInt d = 0; d < 3; d++) { /* the first node is already held */
     const PetscInt row = e.n++;
     e.add_symmetric(row, d, 2.);
     e.add(row, row, 0.);

@@ -1,4 +1,4 @@
-/* The solver type "mumpsnd" on all ranks together: many right-hand sides at once, and workspace that has to grow */
+/* The solver type "mumpsnd" on all ranks together: many right-hand sides at once, and workspace that must grow */
 #include "distributed_matrix.h"
 #include "linear/linear.h"
 #include <hhtdae/hhtdae.h>
@@ -9,7 +9,7 @@ using namespace hhtest;
 namespace
 {
 
-const PetscInt COLUMNS = 70; /* more than MUMPS takes at a time */
+const PetscInt COLUMNS = 70; /* more than MUMPS processes at a time */
 
 class MumpsNDRanks : public testing::Test
 {
@@ -58,7 +58,7 @@ protected:
       must(MatCholeskyFactorNumeric(F, A, &info));
   }
 
-  /* Columns that depend on rows of the whole matrix alone; lda: some rows of memory are not of the matrix */
+  /* Columns that depend on the global row only; gap: additional rows in memory that are not part of the matrix (lda) */
   Mat columns(PetscInt count, PetscInt gap)
   {
     Mat      B;
@@ -79,7 +79,7 @@ protected:
     return B;
   }
 
-  /* Solutions of all columns against one solve for each of them */
+  /* Solutions of all columns at once against one solve for each of them */
   void compare(PetscInt count, PetscInt gap)
   {
     Mat       B = columns(count, gap), X = columns(count, 2 * gap);
@@ -124,7 +124,7 @@ TEST_F(MumpsNDRanks, ManyRightHandSidesInSmallBlocks)
   compare(COLUMNS, 0);
 }
 
-/* Places of the solution may change with every factorization, and between A and its transpose */
+/* The distribution of the solution may change with every factorization, and between A and its transpose */
 TEST_F(MumpsNDRanks, ManyRightHandSidesAfterChanges)
 {
   PetscInt begin, end;

@@ -1,4 +1,5 @@
-/* The page of a run on several ranks is that of one: the first rank writes it, with bodies, modes and channels of all. */
+/* The page of a run on several ranks is that of one rank: the first rank writes it, with bodies, modes and channels of
+   all ranks */
 #include "hhtdae/output.h"
 #include "modal_cloud.h"
 #include "scene_output.h"
@@ -66,7 +67,7 @@ TEST(Page, AsOnOneRank)
   EXPECT_GT(moved, 0.1);
 }
 
-/* No rank waits for the first one where that cannot write */
+/* If the first rank cannot write, no rank waits for it */
 TEST(Page, AllRanksFail)
 {
   for (const char *file : {"/dev/full", "/nowhere/page.html"}) {

@@ -1,4 +1,4 @@
-/* Questions to a run, on all ranks the answers of one. */
+/* Snapshots of a run give the same answers on all ranks as on one */
 #include "hhtdae/query.h"
 #include "scene_output.h"
 
@@ -13,7 +13,7 @@ std::vector<double> answers(MPI_Comm comm)
   std::vector<double> all;
   const Element       spring = rods.scene.add("spring", SpringDamper{rods.tip[5], rods.centre[0], 30});
   const Variable      v      = rods.scene.variable("v", Measure::jointForce(rods.pin[3], 1));
-  SceneRun            run(rods.scene, 0.5, tolerance(1e-9) + " -ts_adapt_type none -ts_dt 2e-3 "); /* the same steps */
+  SceneRun            run(rods.scene, 0.5, tolerance(1e-9) + " -ts_adapt_type none -ts_dt 2e-3 "); /* fixed steps, so that both runs have the same */
   Snapshot            now;
   must(run.solve());
   must(now.take(run.ts, 0.5));
@@ -47,7 +47,7 @@ TEST(QueryRanks, TheSameAnswers)
   for (std::size_t k = 0; k < one.size(); k++) EXPECT_NEAR(one[k], all[k], 1e-6 * std::max(1., std::abs(one[k]))) << k;
 }
 
-/* Several runs at once, with a parameter changed between them */
+/* Several runs side by side, with a parameter changed between them */
 TEST(QueryRanks, RunsSideBySide)
 {
   Scene           scene(PETSC_COMM_WORLD);
@@ -83,7 +83,7 @@ TEST(QueryRanks, RunsSideBySide)
   EXPECT_GT((x[0].position - x[1].position).norm(), 1e-3);
 }
 
-/* Rows of one constraint that hold bodies of different ranks against a weight of 3 m/s^2 */
+/* One constraint whose rows hold bodies of different ranks against a gravity of 3 m/s^2 */
 TEST(QueryRanks, LoadsOfRowsOnDifferentBodies)
 {
   Scene               scene(PETSC_COMM_WORLD, Space::Planar);

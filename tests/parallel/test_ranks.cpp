@@ -19,8 +19,8 @@ End run(MPI_Comm comm, const Problem &p, const std::string &options, bool setRol
   return {r.u(), r.v(), r.a(), r.statistics(), r.t()};
 }
 
-/* Rounding of q enters Phi, and through (9b) lambda and q'' divided by beta h^2: with the accelerations for scale this is as far
-   as the algebraic unknowns of an index-3 method agree in double precision, whatever computes them */
+/* The rounding of q enters Phi, and by (9b), divided by beta h^2, lambda and q''. Relative to the accelerations, the
+   algebraic unknowns of an index-3 method cannot agree better than this in double precision, however they are computed */
 double algebraicFloor(const Problem &p, const End &e)
 {
   const double h = (p.t1 - p.t0) / e.s.steps;
@@ -44,7 +44,7 @@ void compare(const Problem &p, const std::string &options, bool setRoles = false
     for (int k = 0; k < 2; k++) {
       const End &e = k ? self : all;
       (p.role[i] <= TSHHT3_STATE ? q[k] : l[k]).push_back(e.u[i]);
-      /* the derivative of a state is as good as the accelerations that drive it */
+      /* the derivative of a state is as accurate as the accelerations on which it depends */
       (p.role[i] == TSHHT3_COORDINATE ? v[k] : l[k]).push_back(e.v[i]);
     }
   const double dq = relativeDifference(q[0], q[1]), dv = relativeDifference(v[0], v[1]),
@@ -55,12 +55,12 @@ void compare(const Problem &p, const std::string &options, bool setRoles = false
              (int)all.s.steps, (int)self.s.steps);
   EXPECT_EQ(all.t, p.t1);
   EXPECT_EQ(all.s.steps, self.s.steps);
-  EXPECT_LT(dq, 1e-9); /* rates of a start are differences over a short time */
+  EXPECT_LT(dq, 1e-9); /* rates at the start are differences over a short time */
   EXPECT_LT(dv, 1e-9);
   EXPECT_LT(dl, 1e-9 + algebraicFloor(p, self));
 }
 
-/* Steps of one length, so that no decision hangs on a rounding error, and corrections to rounding */
+/* Steps of constant length, so that no decision depends on rounding errors, and corrections solved to rounding */
 std::string steps(const Problem &p, int n)
 {
   return fixedSteps((p.t1 - p.t0) / n) + "-ts_hhtdae_corrector_tolerance 1e-10 ";
@@ -115,7 +115,7 @@ TEST(Ranks, NonholonomicConstraints)
   compare(p, steps(p, 100));
 }
 
-/* Under error control the same to the tolerance */
+/* Under error control the results agree to the tolerance */
 TEST(Ranks, ErrorControl)
 {
   const Chain p(30, 0., .3);
@@ -144,14 +144,14 @@ TEST(Ranks, Projection)
   compare(p, steps(p, 20) + "-ts_hhtdae_start project ");
 }
 
-/* More ranks than bodies: some have no multiplier, some nothing but one */
+/* More ranks than bodies: some ranks have no multiplier, some only a multiplier */
 TEST(Ranks, FewerUnknownsThanRanks)
 {
   const Oscillators p({2.}, {0.}, false, 1.);
   compare(p, steps(p, 50));
 }
 
-/* The message of an error is the same everywhere: no rank is left waiting */
+/* The error message is the same on all ranks, and no rank is left waiting */
 TEST(Ranks, ErrorsReachAllRanks)
 {
   struct Spoiled : Pendulum {
@@ -186,7 +186,7 @@ TEST(Ranks, Checkpoint)
   if (!rank) std::remove(file.c_str());
 }
 
-/* Every rank names an unknown of the next one */
+/* Every rank names an unknown of the next rank, which is refused */
 TEST(Ranks, IndexOfAnotherRankIsRefused)
 {
   const Chain p(10, 0., .1);
@@ -202,7 +202,7 @@ TEST(Ranks, IndexOfAnotherRankIsRefused)
   EXPECT_TRUE(trap.says("not among the unknowns")) << trap.message;
 }
 
-/* Orders above two, at fixed steps, and chosen under error control */
+/* Orders above two at fixed steps, and the automatic order under error control */
 TEST(Ranks, HigherOrder)
 {
   const Pendulum pendulum(-90., 0., 1.);

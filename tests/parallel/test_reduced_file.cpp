@@ -1,4 +1,4 @@
-/* The file of a reduced body, its field and its hot spots on several ranks are those of one rank, to the last byte. */
+/* The file of a reduced body, its field and its hot spots on several ranks equal those of one rank to the last byte */
 #include "hhtdae/flexible.h"
 #include "reduced_body.h"
 
@@ -44,7 +44,7 @@ TEST(ReducedFile, ReadByAll)
   EXPECT_TRUE(SameMatrix(read.shape, alone.body.shape.middleRows(3 * read.first, 3 * read.own)));
   must(LoadModalBody(PETSC_COMM_WORLD, file.name, &modal));
   EXPECT_TRUE(Same(alone.body.modal, modal));
-  /* another distribution than it was written with, the same file */
+  /* distributed differently from the writing run, but the same file */
   must(read.save(again.name));
   EXPECT_EQ(file.text(), again.text());
 }
@@ -61,7 +61,7 @@ TEST(ReducedFile, RanksWithoutNodes)
   EXPECT_EQ(file.text(), again.text());
 }
 
-/* A file that is refused is refused on all ranks, with one reason */
+/* A faulty file is refused on all ranks, with the same reason */
 TEST(ReducedFile, RefusedByAll)
 {
   HandMade all(PETSC_COMM_WORLD, 2, 2);
@@ -88,13 +88,13 @@ TEST(ReducedFile, RefusedByAll)
   ReducedBody read;
   EXPECT_NE(read.load(PETSC_COMM_WORLD, "/nowhere/body.h5"), 0);
   EXPECT_TRUE(trap.says("there is no such file")) << trap.message;
-  /* one rank's numbers are bad: nobody writes, nobody waits */
+  /* the numbers of one rank are bad: no rank writes, and none waits */
   if (Rank() == 0) all.body.coordinates[0] = 1. / 0.;
   EXPECT_NE(all.body.save(broken.name), 0);
   EXPECT_NE(all.body.save("/nowhere/body.h5"), 0);
 }
 
-/* Matrices, nodes and sets from files: each rank reads a range of lines, all lines arrive */
+/* Matrices, nodes and sets from files: each rank reads a range of lines, and all lines are read */
 TEST(Import, AsOnOneRank)
 {
   const PetscInt n = 40;
@@ -145,7 +145,7 @@ TEST(Import, AsOnOneRank)
       must(MatRestoreRow(mass ? all.M : all.K, row, &a, &i, &v));
       must(MatRestoreRow(mass ? alone.M : alone.K, row, &b, &j, &w));
     }
-  /* a line of one rank's range is bad: all refuse */
+  /* a line in the range of one rank is bad: all ranks refuse */
   FeModel   refused(PETSC_COMM_WORLD);
   ErrorTrap trap;
   MPI_Barrier(PETSC_COMM_WORLD);

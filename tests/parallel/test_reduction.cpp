@@ -1,4 +1,4 @@
-/* Reductions on all ranks together and on every rank alone */
+/* Reductions on all ranks together and on each rank alone */
 #include "box_model.h"
 #include "fe_mesh.h"
 #include "hhtdae/flexible.h"
@@ -47,7 +47,7 @@ double off(const Eigen::MatrixXd &a, const Eigen::MatrixXd &b)
   return a.size() ? (a - b).cwiseAbs().maxCoeff() / b.cwiseAbs().maxCoeff() : 0.;
 }
 
-/* The shape on all ranks is that of one, node by node */
+/* Difference between the mode shapes of all ranks and those of one rank, node by node */
 double shapeOff(const ReducedBody &all, const ReducedBody &self)
 {
   double worst = 0, most = self.shape.size() ? self.shape.cwiseAbs().maxCoeff() : 1.;
@@ -90,7 +90,7 @@ void compare(const char *name, const Box &box, const Reduction &r)
   EXPECT_LT(motion, 1e-6);
   EXPECT_LT(shape, 1e-6);
   EXPECT_LT(stiffening, 1e-6);
-  /* the same to the last bit on all ranks */
+  /* equal to the last bit on all ranks */
   double first = a.modal.omega[0], least, most;
   first += a.modal.quadratic[3].sum() + a.modal.attachments.size() + a.modal.moment[1].sum() + a.mode[0].residual + a.modal.stiffening[4].sum();
   MPI_Allreduce(&first, &least, 1, MPI_DOUBLE, MPI_MIN, PETSC_COMM_WORLD);
@@ -98,13 +98,13 @@ void compare(const char *name, const Box &box, const Reduction &r)
   EXPECT_EQ(least, most);
 }
 
-/* Every rank gets the same message */
+/* The error message, which must be the same on every rank */
 std::string failure(const FeModel &model, const Reduction &reduction)
 {
   ErrorTrap   trap;
   ReducedBody body;
   EXPECT_NE(Reduce(model, reduction, &body), 0);
-  /* an error on a communicator is printed by its first rank alone */
+  /* the first rank alone prints an error of a communicator */
   char text[512] = "";
   std::snprintf(text, sizeof text, "%s", trap.message.c_str());
   MPI_Bcast(text, sizeof text, MPI_CHAR, 0, PETSC_COMM_WORLD);
@@ -137,7 +137,7 @@ TEST(ReductionRanks, FreeFreeWithoutAttachments)
   r.modes = 12;
   compare("free-free, no attachments", bar(false), r);
 }
-/* Bending frequencies are there twice: modes are turned to the same choice on any number of ranks */
+/* Bending frequencies are double: the modes are rotated to a unique choice, which is the same on any number of ranks */
 TEST(ReductionRanks, EqualFrequencies)
 {
   compare("square section", bar(true), reductionOf(Tie::Rigid, Tie::Rigid, Method::CraigBampton));
@@ -149,7 +149,7 @@ TEST(ReductionRanks, EqualFrequenciesFree)
   compare("square section, free-free", bar(true), r);
 }
 
-/* All nodes of an attachment that reaches over the ranks' borders */
+/* An attachment whose nodes are on several ranks */
 TEST(ReductionRanks, AttachmentOnAllRanks)
 {
   for (Tie tie : {Tie::Rigid, Tie::Average}) {
@@ -169,8 +169,8 @@ TEST(ReductionRanks, AttachmentOnAllRanks)
   }
 }
 
-/* Nodes of a mesh get their global numbers from the partition; weights go by labels, which are the same on any number of ranks: here the attachment's default
-   position is the weighted centroid, at an end whose nodes are all alike but for their places */
+/* The global numbers of a mesh's nodes depend on the partition; weights belong to labels, which do not. Here the
+   default position of the attachment is the weighted centroid of an end whose nodes differ only by their positions */
 TEST(ReductionRanks, WeightsGoByLabels)
 {
   MeshBox box{ElementType::Brick20, 7, 2, 2};
@@ -223,7 +223,7 @@ TEST(ReductionRanks, ErrorsOnAllRanks)
   Reduction held;
   held.attachments.resize(1);
   held.attachments[0].name = "left";
-  for (const char *far : {" 31,", " 32,", " 33,"}) EXPECT_SAYS(failure(swings.model, held), far); /* an edge, which moves as one */
+  for (const char *far : {" 31,", " 32,", " 33,"}) EXPECT_SAYS(failure(swings.model, held), far); /* an edge that moves as a whole */
   held.attachments.clear();
   EXPECT_SAYS(failure(swings.model, held), "mechanism");
 

@@ -1,4 +1,4 @@
-/* Ranks that describe different scenes, or different runs of one */
+/* Ranks that describe different scenes, or different runs of one scene, are detected */
 #include "scene_output.h"
 
 using namespace hhtest;

@@ -1,4 +1,4 @@
-/* Scenes on all ranks together and on every rank alone: every body goes the same way */
+/* Scenes on all ranks together and on each rank alone: every body has the same motion */
 #include "hhtdae/scene.h"
 #include "scene/model.h"
 #include "scene_output.h"
@@ -11,7 +11,7 @@ namespace
 using Build = std::function<void(Scene &)>;
 
 struct ChainEnd {
-  Array            x, v; /* of markers at the centre and beside it, of all bodies in their order */
+  Array            x, v; /* of markers at the centre and off the centre of all bodies, in their order */
   TSHHT3Statistics s;
 };
 
@@ -72,7 +72,7 @@ ChainEnd compare(const char *what, Space space, const Build &build, double end, 
   EXPECT_EQ(all.s.changes, self.s.changes);
   EXPECT_LT(dx, q);
   EXPECT_LT(dv, 10 * q);
-  /* it has moved */
+  /* the bodies have moved */
   const ChainEnd start = run(PETSC_COMM_SELF, space, build, end / steps, options);
   EXPECT_GT(relativeDifference(all.x, start.x), 1e-3);
   return all;
@@ -91,7 +91,7 @@ template <class Joint> Build hanging(int n)
   };
 }
 
-/* Knots of point masses, rods on ball joints between them, held along a side: rows x columns closed loops */
+/* Knots of point masses, connected by rods on ball joints and held along one side: rows x columns closed loops */
 void net(Scene &scene, int rows, int columns)
 {
   std::vector<Marker> knot(columns);
@@ -117,8 +117,8 @@ void net(Scene &scene, int rows, int columns)
     }
 }
 
-/* Joints of several kinds, a motion, springs across the scene, one of them as a force state, contact, a variable and a
- * state */
+/* Joints of several kinds, a motion, springs across the scene (one as a force state), contact, a variable and a
+   first-order state */
 void mixed(Scene &scene)
 {
   const Body ground = scene.ground();
@@ -132,7 +132,7 @@ void mixed(Scene &scene)
     b.velocity         = v;
     return scene.add("", b);
   };
-  /* a crank that is driven, and a chain of three joints behind it */
+  /* a driven crank, and a chain of three joints connected to it */
   const Body crank = box({0, 0, 5}, {0, 0, 2});
   scene.add("", Revolute{scene.marker(crank), scene.marker(ground, {0, 0, 5})});
   scene.add("", RotationalMotion{scene.marker(crank), scene.marker(ground, {0, 0, 5}),
@@ -148,7 +148,7 @@ void mixed(Scene &scene)
   scene.add("", Cylindrical{at(b, 2, X), at(a, 2, X)});
   scene.add("", Spherical{at(c, 3), at(b, 3)});
   const Element pull = scene.add("", SpringDamper{at(b, 2.5), at(a, 1.5), 200, 3, -1, 0, true});
-  /* balls that fall onto each other and the floor */
+  /* balls that fall onto each other and onto the floor */
   std::vector<Marker> balls;
   ContactLaw          law;
   law.stiffness     = 2e4;
@@ -161,7 +161,7 @@ void mixed(Scene &scene)
     scene.add("", SpherePlane{balls[k], floor, 0.5, law});
     if (k > 0) scene.add("", SphereSphere{balls[k], balls[k - 1], 0.5, 0.5, law});
   }
-  /* springs across the scene, a force that a state drives */
+  /* springs across the scene, and a force that depends on a state */
   scene.add("", SpringDamper{at(c, 4), balls[3], 5, 0.1});
   scene.add("", SpringDamper{at(a, 1.7), balls[0], 3});
   const Variable d =
@@ -173,7 +173,8 @@ void mixed(Scene &scene)
                                 Expression{{Measure::value(s)}, [](const Real *m) -> Real { return m[0] * -2.; }}});
 }
 
-/* Bodies that turn over on springs between them: new references, or axes of Euler angles, on one rank, which others read */
+/* Bodies that turn over, connected by springs: new references of rotation vectors, or new axes of Euler angles, on one
+   rank, which other ranks read */
 void turning(Scene &scene)
 {
   Marker last = scene.marker(scene.ground());
@@ -208,7 +209,7 @@ TEST(SceneRanks, Net)
       "net of 4 x 5", Space::Spatial, [](Scene &s) { net(s, 4, 5); }, 0.5, 100);
 }
 
-/* Past attitudes with the bodies of every rank; some turn too far for order 5 */
+/* Past attitudes of bodies on every rank; some bodies rotate too far for order 5 */
 TEST(SceneRanks, HigherOrder)
 {
   const ChainEnd e = compare("net of 4 x 5, order 5", Space::Spatial, [](Scene &s) { net(s, 4, 5); }, 0.5, 100, "-ts_hhtdae_order 5 ");
@@ -231,8 +232,8 @@ TEST(SceneRanks, BodiesTurningOver)
   }
 }
 
-/* With the step chosen by its error the sequence may differ by rounding: the same to the tolerance, and the same axes
- * of the angles */
+/* Under error control the sequence of steps may differ because of rounding: results agree to the tolerance, with the
+   same axes of the angles */
 TEST(SceneRanks, ChosenSteps)
 {
   const std::string options = tolerance(1e-6);

@@ -1,4 +1,4 @@
-/* What a run counts and watches from step to step, on all ranks together: angles that questions ask for, rows that were dropped */
+/* What a run records from step to step, on all ranks together: angles that snapshots ask for, dropped rows */
 #include "hhtdae/analyses.h"
 #include "hhtdae/query.h"
 #include "scene_output.h"
@@ -7,7 +7,8 @@
 
 using namespace hhtest;
 
-/* A row of wheels, each on its own axle beside the last one's; every rank gets some. The first is driven, gears drive the rest. */
+/* A row of wheels, each on its own axle beside the previous one, distributed over the ranks. The first wheel is
+   driven, gears drive the others */
 TEST(SceneCounts, AnglesOfQuestions)
 {
   const double turn = 2 * M_PI;
@@ -35,9 +36,9 @@ TEST(SceneCounts, AnglesOfQuestions)
     if (kinematic) must(Kinematics(run.ts, 3.4));
     else must(run.solve());
     must(now.take(run.ts));
-    must(now.value(Measure::angle(i[n - 1], i[0]), &x)); /* from the first question on */
+    must(now.value(Measure::angle(i[n - 1], i[0]), &x)); /* counted from the first question on */
     EXPECT_NEAR(x, -6.8 * turn, 1e-5);
-    must(now.value(Measure::angle(i[n - 1], j[n - 1]), &x)); /* the gear counts it */
+    must(now.value(Measure::angle(i[n - 1], j[n - 1]), &x)); /* counted by the gear */
     EXPECT_NEAR(x, -3.4 * turn, 1e-5);
   }
 }

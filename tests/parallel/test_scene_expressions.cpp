@@ -1,5 +1,5 @@
 /* Variables, states and user's forces whose arguments are on other ranks: the same run on all ranks together and on
- * each alone */
+   each rank alone */
 #include "hhtdae/scene.h"
 #include "scene/runtime.h"
 #include "support.h"
@@ -40,8 +40,8 @@ struct Chain {
 private:
   void describe()
   {
-    /* weak: accelerations and multipliers feed forces, which has one solution only where the loop gains less than the
-     * masses */
+    /* weak, because forces that depend on accelerations and multipliers have a unique solution only if the gain of
+       this loop is smaller than the masses */
     const auto     wave = [](const Real *m) -> Real { return sin(.1 * m[0]) + .01 * m[1]; };
     const Variable far  = scene.variable(
          "far", Expression{{Measure::acceleration(tip[6], 1, tip[0], tip[3]), Measure::multiplier(pin[5], 1)}, wave});
@@ -63,8 +63,7 @@ private:
   }
 };
 
-/* Coordinates, velocities and accelerations of the bodies, then variables and states: in the order of the description
- */
+/* Coordinates, velocities and accelerations of the bodies, then variables and states, in the order of the description */
 Array run(MPI_Comm comm)
 {
   Chain c(comm);

@@ -1,4 +1,4 @@
-/* Results of a scene on several ranks are those of one: channels whose markers are on different ranks, energies, frames. */
+/* Results of a scene on several ranks equal those of one rank: channels with markers on different ranks, energies, frames */
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -6,7 +6,7 @@ using namespace hhtest;
 namespace
 {
 
-/* A chain of rods; every kind of channel, some of them between far bodies */
+/* A chain of rods with every kind of channel, some of them between distant bodies */
 void Record(MPI_Comm comm, const std::string &csv, const std::string &sheet, const std::string &film, std::string &said)
 {
   Rods    rods(6, comm);
@@ -40,7 +40,7 @@ TEST(SceneOutput, AsOnOneRank)
 {
   PetscMPIInt rank;
   MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  /* file names of every rank its own; the first rank's are written */
+  /* each rank has file names of its own; files with the first rank's names are written */
   TemporaryFile csv("all.csv"), one("one.csv"), sheet("all.sheet"), sheet_one("one.sheet");
   TemporaryFile pvd("all.pvd"), frame0("all_000000.vtp"), frame1("all_000001.vtp");
   TemporaryFile pvd1("one.pvd"), one0("one_000000.vtp"), one1("one_000001.vtp");
@@ -65,7 +65,7 @@ TEST(SceneOutput, AsOnOneRank)
   const CSV p(sheet.text()), q(sheet_one.text());
   ASSERT_FALSE(p.row.empty());
   for (std::size_t c = 1; c < p.name.size(); c++) EXPECT_NEAR(p.row.back()[c], q.row.back()[c], 1e-5) << p.name[c];
-  /* the start is the same to the last bit of a float; later ones to rounding, which base64 does not forgive */
+  /* the start is the same to the last bit of a float; later frames agree only to rounding, which makes base64 texts differ */
   EXPECT_EQ(frame0.text(), one0.text());
   EXPECT_EQ(frame1.text().size(), one1.text().size());
   EXPECT_EQ(pvd.text().size() > 200, true);

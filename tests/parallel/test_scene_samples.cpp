@@ -1,4 +1,4 @@
-/* Samples that are solved for, on several ranks as on one */
+/* Samples that need a solve give the same values on several ranks as on one */
 #include "scene_output.h"
 
 using namespace hhtest;
@@ -6,7 +6,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Reactions, accelerations and a variable between long steps, and the end of the run; dt < 0: not sampled */
+/* Reactions, accelerations and a variable between long steps, and the state at the end of the run; dt < 0: no samples */
 void samples(MPI_Comm comm, double dt, const std::string &file, Array &end)
 {
   Rods   rods(5, comm);
@@ -42,7 +42,7 @@ TEST(SceneSamples, AsOnOneRank)
   Array         sampled, alone, serial;
   samples(PETSC_COMM_WORLD, 0.0037, all.name, sampled);
   samples(PETSC_COMM_WORLD, -1, "", alone);
-  EXPECT_EQ(sampled, alone); /* the run does not know that it is sampled */
+  EXPECT_EQ(sampled, alone); /* sampling does not change the run */
   samples(PETSC_COMM_SELF, 0.0037, one.name, serial);
   if (rank) return;
   const CSV a(all.text()), b(one.text());

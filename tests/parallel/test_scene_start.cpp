@@ -25,7 +25,7 @@ void expectSame(const Scene &a, const Scene &b, double tolerance)
   }
 }
 
-/* Distributed, and on every rank by itself */
+/* On all ranks together, and on each rank alone */
 void compare(const std::function<void(Scene &)> &describe, double tolerance)
 {
   Scene   all(PETSC_COMM_WORLD), alone(PETSC_COMM_SELF);
@@ -82,7 +82,7 @@ TEST(SceneStart, EquilibriumOfAHangingNet)
       1e-7);
 }
 
-/* The run after rows were dropped: the pattern, the exchange and the roles fit what is left */
+/* A run after rows were dropped: the nonzero pattern, the communication and the roles fit the remaining rows */
 TEST(SceneStart, ARunWithRowsDropped)
 {
   double r[2][3];

@@ -1,4 +1,4 @@
-/* The surface of a body that several ranks share is that of one rank, on the first of them. */
+/* The surface of a body distributed over several ranks equals that of one rank, and is collected on the first rank */
 #include "hhtdae/flexible.h"
 #include "reduced_body.h"
 

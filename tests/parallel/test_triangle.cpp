@@ -1,4 +1,4 @@
-/* A Jacobian that holds one triangle, MATSBAIJ, distributed over ranks: the same run as with all of it on one */
+/* A distributed Jacobian that stores one triangle (MATSBAIJ): the same run as with the full matrix on one rank */
 #include "triangle.h"
 
 using namespace hhtest;
@@ -14,7 +14,7 @@ TEST(TriangleRanks, SameRunAsWithAllOfTheMatrix)
   must(MatGetFactorAvailable(A, "mumpsnd", MAT_FACTOR_CHOLESKY, &is));
   must(MatDestroy(&A));
   if (!is) GTEST_SKIP() << "this PETSc was built without MUMPS";
-  p.t1 = 0.02; /* few steps: MUMPS on more ranks than cores takes its time */
+  p.t1 = 0.02; /* few steps, because MUMPS is slow with more ranks than cores */
   const TriangleRun self(PETSC_COMM_SELF, p, 0, options, true);
   for (PetscInt block : {1, 3}) {
     const TriangleRun half(PETSC_COMM_WORLD, p, block, options, block == 1);

@@ -1,4 +1,4 @@
-/* What messages call unknowns is the same on any number of ranks, wherever their rows are. */
+/* Names of unknowns in messages are the same on any number of ranks, wherever their rows are */
 #include "box_model.h"
 #include "scene/model.h"
 #include "scene_start.h"
@@ -11,7 +11,7 @@ using namespace hhtest;
 namespace
 {
 
-/* Rods that hang from one another, with a variable and a state, on a pin that is there twice */
+/* Rods that hang from one another, with a variable and a state, on a pin that is described twice */
 void hang(Scene &scene)
 {
   Body before = scene.ground();
@@ -50,7 +50,7 @@ TEST(UnknownNamesOnRanks, OfAMechanism)
   EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), names.size());
 }
 
-/* Nodes of a whole body, which every rank numbers a part of */
+/* Nodes of a whole body, a part of which each rank numbers */
 TEST(UnknownNamesOnRanks, OfNodes)
 {
   std::vector<std::string> names[2];
