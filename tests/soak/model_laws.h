@@ -22,11 +22,11 @@ constexpr double allowed_imbalance = 1e-9, allowed_residual = 1e-9;
 
 inline Settings LawSettings(double work)
 {
+  /* slack: the measured rate is that of the largest corrections; in stiff directions, where corrections are small, the
+     iteration may converge far more slowly */
   Settings s;
   s.corrector = 1e-9;
   s.tolerance = 1e-4;
-  /* The measured rate is that of the largest corrections. In stiff directions, where corrections are small, the
-     iteration may converge far more slowly */
   s.slack     = 1e3 * s.corrector * s.tolerance;
   s.laws      = true;
   s.work      = work;
