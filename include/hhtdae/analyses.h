@@ -41,7 +41,10 @@ PetscErrorCode AssembleAt(TS ts, PetscReal t);
 
 /* The same where motions and joints leave no freedom, which is an error otherwise: positions, velocities and, in a Snapshot,
    accelerations and loads follow from the motions alone, without the error of a step. The loads of the motions are those that the
-   movement needs: inverse dynamics. Constraints of velocities are an error, what they do to positions needs a run in time. */
+   movement needs: inverse dynamics. Constraints of velocities are an error, what they do to positions needs a run in time.
+   All of these follow the motions from the time of the run to t, in steps that are as short as need be to stay on the branch that the motion leads to
+   where a linkage could be assembled in another way, also through change points, where velocities go on; the times of calls do not matter for that. Where motions return to a value
+   that they have had, what they did meanwhile is not looked at. */
 PetscErrorCode Kinematics(TS ts, PetscReal t);
 
 } // namespace hhtdae

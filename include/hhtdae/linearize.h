@@ -30,6 +30,9 @@
   directions that constraints leave free, orthonormal in the metric of the masses. For a single degree of freedom the result is that of
   motion along its path at any speed: the rod has value^2 = -m g l cos(angle)/J. The sparse methods, response() and SlowestModes(), take
   constraints as they are at this time; they are meant for equilibria and steady motions.
+  M, C and K are derivatives of the whole F, with positions, velocities, accelerations, multipliers and states held at their present values.
+  So K has, besides springs, the stiffness of loads and reactions by their directions, of velocities (centrifugal) and of accelerations; C has
+  dampers and gyroscopic terms. Changes of M, C and K with time are not included, but for the rates of constraints above.
   Loads, reactions and deformations that stiffen elastic bodies are those at this time in all calls: such bodies need an equilibrium or a
   steady motion, to which a run with damping leads. steadiness() tells how far the state is from one.
   All calls are collective, with the same results on every rank. A linearization is valid as long as its TS exists.

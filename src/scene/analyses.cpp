@@ -4,7 +4,12 @@
 
     (F_u + r F_u' + s F_u'') d = (0, Phi),   s large: d is the smallest step in the metric of the mass matrix.
 
-  Steps are limited to largest_turn (still.h). Velocities, accelerations and multipliers then follow from a consistent start at these positions.
+  Steps are shortened to largest_turn (still.h). Velocities, accelerations and multipliers are then those of a consistent start from these positions.
+
+  Where there are several positions near by, as in a four-bar that can change from one way of assembly to the other, those that the motion leads to are meant. So time is divided
+  (FollowMotions()) into steps of largest_turn at most, whose first Newton iteration is the predictor along the velocities. A step is too long if the inverse of the constraints'
+  derivatives has changed in it by so much that iterations with the old and with the new one differ: if one of their singular values has changed its sign, the step has come to another
+  branch. Where branches do cross, it does so in steps of any length, and the one is taken whose velocities go on.
 */
 #include "hhtdae/analyses.h"
 #include "guard.h"
@@ -31,8 +36,22 @@ constexpr double max_extra_iterations = 1e4;
 /* Largest change of an angle that a motion prescribes between two assemblies, rad: well below half a turn, beyond which
    full turns of angles would be lost (CountedAngles.KinematicsOverManyTurns) */
 constexpr double max_motion_angle = 1;
+/* Largest change of the second iteration of a step by the change of the constraints' derivatives within the step, relative: a change of sign of a singular value makes it more than 1 */
+constexpr double largest_change = 0.5;
+/* A step whose predictor is shorter, in units of largest_turn, and which is too long nevertheless, is at a point where branches cross (Analyses.KinematicsThroughChangePoints) */
+constexpr double shortest_step = 1. / 1024;
+/* Shortening of a step at once, so that none is as short as rounding of the time (Analyses.AssemblyOfWhatIsNoNumber) */
+constexpr double most_shortening = 1. / 16;
+/* Steps across such a point, times the one that was too long; largest change of velocities in them, relative to the largest velocity */
+constexpr double steps_across[] = {4, 8, 16}, largest_bend = 0.1;
 /* Newton steps shorter than this, in radians or parts of the scene's size, are rounding and end the iteration */
 constexpr double negligible_step = 1e-13;
+/* Second iterations that say nothing of the constraints' derivatives: rounding of the constraints times the inverse of these near change points */
+constexpr double negligible_bend = 1e-11;
+/* Of the last Newton step of a step that is followed: far less than branches are apart */
+constexpr double accurate_step = 1e-9;
+/* Growth of the speed at which a motion has come to its end, as where a linkage locks; over steps that are longer than long_step, in units of largest_turn, which a start from rest does not do */
+constexpr double locked_speed = 100, long_step = 0.1;
 
 struct AssemblySystem : StillSystem {
   using StillSystem::StillSystem;
@@ -119,25 +138,45 @@ PetscErrorCode WorstRow(AssemblySystem &E, std::string *name)
   PetscFunctionReturn(0);
 }
 
-/* Moves U to the nearest positions that satisfy the constraints at t; V is transformed where the axes of Euler angles change */
-PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
+/* What Newton's iteration has come to */
+struct Approach {
+  double first   = 0;        /* length of the first step, in units of largest_turn */
+  double last    = INFINITY; /* of the last one */
+  bool   regular = true;     /* the step from the positions before it is not too long */
+};
+
+/* After the second iteration, with the derivatives at the end of the first one: A is what it would have been with those at its beginning */
+PetscErrorCode CompareIterations(AssemblySystem &E, bool *regular)
 {
-  AssemblySystem E(R, t);
-  double     part = INFINITY;
-  bool           improved;
+  double change, old;
   PetscFunctionBegin;
-  PetscCall(E.create(U, "scene_assembly_"));
-  PetscCall(RolesOf(E.R, E.role));
-  PetscCall(VecCopy(V, E.V));
+  PetscCall(VecWAXPY(E.next, -1, E.A, E.d));
+  PetscCall(E.reach(E.next, &change));
+  PetscCall(E.reach(E.A, &old));
+  *regular = change <= largest_change * old || old * largest_turn <= negligible_bend;
+  PetscFunctionReturn(0);
+}
+
+/* Moves E.U to the nearest positions that satisfy the constraints at E.t, as far as Newton's iteration gets; E.V is transformed where the axes of Euler angles change. following: it ends where the
+   step from the positions before is too long. */
+PetscErrorCode MeetConstraints(AssemblySystem &E, bool following, Approach *by)
+{
+  bool improved;
+  PetscFunctionBegin;
+  *by = {};
   PetscCall(E.evaluateConstraints(E.U));
   double allowed = newton_iterations;
   for (int it = 0; it < allowed && E.misfit > 0; it++) {
     const double before = E.misfit;
-    PetscCall(E.newtonStep(&part));
-    if (it == 0) allowed += std::min(2 * part, max_extra_iterations); /* a small motion can drive a large one through gears (Analyses.KinematicsOfWhatIsGearedUp) */
-    if (!std::isfinite(part) || part * largest_turn <= negligible_step) break;
-    PetscCall(DampedStep(E, part, &improved));
-    PetscCall(PetscInfo(nullptr, "scene: assembly at t = %g, %d: misfit %g, a step of %g\n", E.t, it, E.misfit, part * largest_turn));
+    PetscCall(E.newtonStep(&by->last));
+    if (it == 0) by->first = by->last;
+    if (it == 0) by->regular = by->first <= 1;
+    if (it == 1 && by->regular && std::isfinite(by->last)) PetscCall(CompareIterations(E, &by->regular));
+    if (following && !by->regular) break;
+    if (it == 0) allowed += std::min(2 * by->first, max_extra_iterations); /* a small motion can drive a large one through gears (Analyses.KinematicsOfWhatIsGearedUp) */
+    if (!std::isfinite(by->last) || by->last * largest_turn <= negligible_step) break;
+    PetscCall(DampedStep(E, by->last, &improved));
+    PetscCall(PetscInfo(nullptr, "scene: assembly at t = %g, %d: misfit %g, a step of %g\n", E.t, it, E.misfit, by->last * largest_turn));
     if (!improved) {
       E.misfit = before;
       break;
@@ -146,20 +185,35 @@ PetscErrorCode MeetConstraints(Runtime &R, double t, Vec U, Vec V)
     PetscCall(Remember(E.R, E.U, E.zero));
     PetscCall(RenewAxes(E.R, E.U, E.V));
   }
-  /* Success if the violations are within the tolerance, both as lengths and as sines (Analyses.AssemblyThatFallsShort),
-     or if the last Newton step is, in scenes so large that rounding of lengths exceeds the tolerance
-     (Analyses.KinematicsInAnyUnitsOfLength) */
+  PetscFunctionReturn(0);
+}
+
+/* Either the violations are within the tolerance, as lengths and as sines (Analyses.AssemblyThatFallsShort), or the last Newton step is, as in scenes so large that rounding of
+   lengths exceeds the tolerance (Analyses.KinematicsInAnyUnitsOfLength) */
+bool Met(const AssemblySystem &E, const Approach &by)
+{
   const double tolerance = E.R.scene.start.tolerance;
-  const bool   met       = E.misfit <= tolerance * std::min(1.0, E.size) || part * largest_turn <= tolerance;
-  if (!met) {
-    std::string worst;
-    PetscCall(WorstRow(E, &worst));
-    SETERRQ(E.R.scene.comm, PETSC_ERR_CONV_FAILED,
-            "the scene cannot be assembled at t = %g: constraints or motions are violated by %g%s.\nTake smaller steps in time, or start nearer to positions that satisfy them", E.t,
-            E.misfit, worst.c_str());
-  }
-  PetscCall(VecCopy(E.U, U));
-  PetscCall(VecCopy(E.V, V));
+  return E.misfit <= tolerance * std::min(1.0, E.size) || by.last * largest_turn <= tolerance;
+}
+
+/* The error that E.t cannot be reached; t: the time that was asked for; where: what is known of how far it can be */
+PetscErrorCode NotAssembled(AssemblySystem &E, double t, const std::string &where)
+{
+  std::string worst;
+  PetscFunctionBegin;
+  PetscCall(WorstRow(E, &worst));
+  SETERRQ(E.R.scene.comm, PETSC_ERR_CONV_FAILED,
+          "the scene cannot be assembled at t = %g: %sconstraints or motions are violated by %g%s.\nTake smaller steps in time, or start nearer to where they are met", t, where.c_str(),
+          E.misfit, worst.c_str());
+}
+
+/* MeetConstraints() in one go */
+PetscErrorCode MustMeetConstraints(AssemblySystem &E, double t)
+{
+  Approach by;
+  PetscFunctionBegin;
+  PetscCall(MeetConstraints(E, false, &by));
+  if (!Met(E, by)) PetscCall(NotAssembled(E, t, E.t == t ? "" : "on the way there, at t = " + Show(E.t) + ", "));
   PetscFunctionReturn(0);
 }
 
@@ -173,21 +227,185 @@ double TurnOfMotions(const SceneData &s, double from, double to)
   return worst;
 }
 
-/* Calls MeetConstraints() at the ends of intervals of time in which no motion turns by more than max_motion_angle, since
-   the nearest positions that satisfy a motion determine its angle only up to full turns */
+/* Positions, velocities, axes and memories of a run, to be restored where an attempt fails */
+class KeptPositions
+{
+public:
+  KeptPositions(Runtime &run, Vec U, Vec V) : R(run), now_{U, V, run.axes} {}
+  ~KeptPositions()
+  {
+    for (Vec &x : kept_) PetscCallAbort(PETSC_COMM_SELF, VecDestroy(&x));
+  }
+  KeptPositions(const KeptPositions &) = delete;
+  PetscErrorCode keep()
+  {
+    PetscFunctionBegin;
+    for (int k = 0; k < 3; k++) {
+      if (!kept_[k]) PetscCall(VecDuplicate(now_[k], &kept_[k]));
+      PetscCall(VecCopy(now_[k], kept_[k]));
+    }
+    queried_ = R.queried_angles;
+    PetscFunctionReturn(0);
+  }
+  PetscErrorCode restore()
+  {
+    PetscFunctionBegin;
+    R.queried_angles = queried_;
+    for (int k = 0; k < 3; k++) PetscCall(VecCopy(kept_[k], now_[k]));
+    PetscCall(UseAxes(R));
+    R.accepted_move = -1; /* the bodies are where the attempt has left them */
+    PetscFunctionReturn(0);
+  }
+
+private:
+  Runtime                  &R;
+  Vec                       now_[3], kept_[3] = {};
+  std::vector<CountedAngle> queried_;
+};
+
+/* v: what the motions move in E.U at E.t within the time dt; infinite where constraints depend on each other */
+PetscErrorCode DisplacementAlong(AssemblySystem &E, double dt, Vec v)
+{
+  const double t = E.t;
+  double       part;
+  PetscFunctionBegin;
+  PetscCall(Jacobian(E.R, t, E.U, E.zero, E.zero, state_shift, mass_shift, E.J));
+  E.t = t - dt / 2;
+  PetscCall(E.evaluateConstraints(E.U));
+  PetscCall(VecCopy(E.F, E.A));
+  E.t = t + dt / 2;
+  PetscCall(E.evaluateConstraints(E.U));
+  PetscCall(VecAXPY(E.F, -1, E.A));
+  E.t = t;
+  PetscCall(E.solveStep(v, &part));
+  if (!std::isfinite(part)) PetscCall(VecSet(v, INFINITY));
+  PetscFunctionReturn(0);
+}
+
+/* From `at` across a point where branches of the motion cross, which is not farther than about dt: to positions, not beyond t, whose velocities go on, if there are some */
+PetscErrorCode StepAcross(AssemblySystem &E, KeptPositions &before, double at, double t, double dt, bool *across)
+{
+  Vec      v[2];
+  double   size[2], bend;
+  Approach by;
+  PetscFunctionBegin;
+  *across = false;
+  for (Vec &x : v) PetscCall(VecDuplicate(E.U, &x));
+  E.t = at;
+  PetscCall(DisplacementAlong(E, dt, v[0]));
+  for (double factor : steps_across) {
+    const bool ends = std::abs(factor * dt) >= std::abs(t - at);
+    E.t             = ends ? t : at + factor * dt;
+    PetscCall(MeetConstraints(E, false, &by));
+    PetscCall(DisplacementAlong(E, dt, v[1]));
+    for (int k = 0; k < 2; k++) PetscCall(E.reach(v[k], &size[k]));
+    PetscCall(VecAXPY(v[1], -1, v[0]));
+    PetscCall(E.reach(v[1], &bend));
+    PetscCall(PetscInfo(nullptr, "scene: across a change point at t = %g to %g: velocities change by %g\n", at, E.t, bend / size[0]));
+    PetscCall(E.evaluateConstraints(E.U));
+    *across = by.first <= 1 && Met(E, by) && bend <= largest_bend * std::max(size[0], size[1]);
+    if (*across) break;
+    PetscCall(before.restore());
+    if (ends) break;
+  }
+  for (Vec &x : v) PetscCall(VecDestroy(&x));
+  PetscFunctionReturn(0);
+}
+
+/* The end of an interval of time from `at` to `next` in which no motion turns by more than max_motion_angle: the nearest positions that satisfy a motion determine its angle only up to full turns */
+double WithoutFullTurns(const SceneData &s, double at, double next)
+{
+  for (double middle; TurnOfMotions(s, at, next) > max_motion_angle; next = middle) {
+    middle = at + (next - at) / 2;
+    if (middle == at || middle == next) break;
+  }
+  return next;
+}
+
+/* Follows the motions from the time `at`, where E.U meets the constraints, to t */
+class Follower
+{
+public:
+  Follower(AssemblySystem &system, double end) : E(system), t_(end), at_(system.t), step_(end - at_), before_(system.R, system.U, system.V) {}
+
+  PetscErrorCode run()
+  {
+    PetscFunctionBegin;
+    while (at_ != t_) {
+      PetscCall(before_.keep());
+      PetscCall(step());
+    }
+    PetscFunctionReturn(0);
+  }
+
+private:
+  AssemblySystem &E;
+  const double    t_;
+  double          at_, step_, slowest_ = INFINITY; /* slowest_: the least mean speed of a long step so far, in units of largest_turn */
+  KeptPositions   before_;
+
+  PetscErrorCode step()
+  {
+    Approach by;
+    PetscFunctionBegin;
+    for (;;) {
+      E.t   = WithoutFullTurns(E.R.scene, at_, std::abs(step_) >= std::abs(t_ - at_) ? t_ : at_ + step_);
+      step_ = E.t - at_;
+      PetscCall(MeetConstraints(E, true, &by));
+      if (by.regular && (E.misfit == 0 || by.last * largest_turn <= accurate_step)) break;
+      PetscCall(before_.restore());
+      const double shorter = by.first > 1 ? std::max(0.9 / by.first, most_shortening) : 0.5;
+      if (by.first < shortest_step || at_ + step_ * shorter == at_) {
+        PetscCall(cross(by.first / std::abs(step_)));
+        PetscFunctionReturn(0);
+      }
+      step_ *= shorter;
+    }
+    at_ = E.t;
+    if (by.first > long_step) slowest_ = std::min(slowest_, by.first / std::abs(step_));
+    step_ *= std::min(2., 0.9 / by.first);
+    PetscFunctionReturn(0);
+  }
+
+  /* Over a point where branches cross. Where that fails, no positions lead on if the speed has grown beyond bounds; else derivatives are not those of smooth constraints, and the next positions are
+     those that Newton's iteration finds. */
+  PetscErrorCode cross(double speed)
+  {
+    const double next = E.t;
+    bool         across;
+    PetscFunctionBegin;
+    PetscCall(StepAcross(E, before_, at_, t_, step_, &across));
+    if (!across && speed > locked_speed * slowest_) {
+      Approach by;
+      E.t = next;
+      PetscCall(MeetConstraints(E, false, &by));
+      PetscCall(NotAssembled(E, t_, "no motion leads there beyond t = " + Show(at_) + ", where it gets infinitely fast; "));
+    }
+    if (!across) {
+      E.t = WithoutFullTurns(E.R.scene, at_, t_);
+      PetscCall(MustMeetConstraints(E, t_));
+    }
+    at_ = E.t;
+    PetscFunctionReturn(0);
+  }
+};
+
+/* Follows the motions from `from` to t. Positions that do not meet the constraints before, as where they are not asked to at the start, go to the nearest ones first. */
 PetscErrorCode FollowMotions(Runtime &R, double from, double t, Vec U, Vec V)
 {
+  AssemblySystem E(R, from);
   PetscFunctionBegin;
-  for (double at = from; at != t;) {
-    double next = t, middle = at + (t - at) / 2;
-    while (TurnOfMotions(R.scene, at, next) > max_motion_angle && middle != at && middle != next) {
-      next   = middle;
-      middle = at + (next - at) / 2;
-    }
-    if (next != t) PetscCall(MeetConstraints(R, next, U, V));
-    at = next;
+  PetscCall(E.create(U, "scene_assembly_"));
+  PetscCall(RolesOf(E.R, E.role));
+  PetscCall(VecCopy(V, E.V));
+  PetscCall(E.evaluateConstraints(E.U));
+  if (!(E.misfit <= R.scene.start.tolerance * std::min(1.0, E.size)) || from == t) {
+    E.t = WithoutFullTurns(R.scene, from, t);
+    PetscCall(MustMeetConstraints(E, t));
   }
-  PetscCall(MeetConstraints(R, t, U, V));
+  PetscCall(Follower(E, t).run());
+  PetscCall(VecCopy(E.U, U));
+  PetscCall(VecCopy(E.V, V));
   PetscFunctionReturn(0);
 }
 
@@ -223,32 +441,25 @@ template <class Move> PetscErrorCode MoveRun(TS ts, const char *call, const Move
 {
   Runtime  *R;
   PetscReal before;
-  Vec       now[3], kept[3];
+  Vec       U, V;
   PetscFunctionBegin;
   PetscCall(NotBegun(ts, call, &R));
   PetscCall(TSGetTime(ts, &before));
-  PetscCall(TS2GetSolution(ts, &now[0], &now[1]));
-  now[2] = R->axes;
-  for (int k = 0; k < 3; k++) {
-    PetscCall(VecDuplicate(now[k], &kept[k]));
-    PetscCall(VecCopy(now[k], kept[k]));
-  }
-  const std::vector<CountedAngle> queried = R->queried_angles;
-  const PetscErrorCode            failed = Guarded([&] {
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  KeptPositions kept(*R, U, V);
+  PetscCall(kept.keep());
+  const PetscErrorCode failed = Guarded([&] {
     PetscReal t;
     PetscFunctionBegin;
-    PetscCall(move(*R, now[0], now[1]));
+    PetscCall(move(*R, U, V));
     PetscCall(TSGetTime(ts, &t));
-    PetscCall(CheckDropped(*R, t, now[0], now[1]));
+    PetscCall(CheckDropped(*R, t, U, V));
     PetscFunctionReturn(PetscErrorCode(0));
   });
   if (failed) {
-    R->queried_angles = queried;
-    for (int k = 0; k < 3; k++) PetscCall(VecCopy(kept[k], now[k]));
-    PetscCall(UseAxes(*R));
+    PetscCall(kept.restore());
     PetscCall(TSSetTime(ts, before));
   }
-  for (Vec &x : kept) PetscCall(VecDestroy(&x));
   PetscCall(failed);
   PetscFunctionReturn(0);
 }

@@ -358,6 +358,101 @@ TEST(Analyses, KinematicsOfAFourBar)
   EXPECT_NEAR(moment[0], moment[1], 1e-4 * std::abs(moment[0]));
 }
 
+namespace
+{
+
+/* A crank of radius 1 about the origin, driven at a rate of 1 from the angle `from` on; in the plane, since a linkage with all axes parallel has redundant rows in space */
+struct CrankDriven {
+  Scene   scene{PETSC_COMM_SELF, Space::Planar};
+  Vector3 pin;
+  Body    crank;
+  Marker  out;
+
+  explicit CrankDriven(double from) : pin(std::cos(from), std::sin(from), 0), crank(scene.add("crank", rod(Vector3::Zero(), pin)))
+  {
+    const Marker i = scene.markerAt(crank, Vector3::Zero()), j = scene.marker(scene.ground());
+    scene.add("bearing", Revolute{i, j});
+    scene.add("drive", RotationalMotion{i, j, TimeFunction::polynomial({0, 1})});
+    scene.start().assembly = Assembly::Project; /* it is described at rest */
+  }
+  void join(Body i, Body j, const Vector3 &at) { scene.add("", Revolute{scene.markerAt(i, at), j.id < 0 ? scene.marker(j, at) : scene.markerAt(j, at)}); }
+  /* The slider's motion is on x; side: of the crank's pin */
+  void slider(double length, int side)
+  {
+    const Vector3 at(pin(0) + side * std::sqrt(length * length - pin(1) * pin(1)), 0, 0);
+    const Body    link = scene.add("link", rod(pin, at));
+    RigidBody     b;
+    b.position         = at;
+    const Body   block = scene.add("block", b);
+    join(crank, link, pin);
+    join(link, block, at);
+    out = scene.markerAt(block, at);
+    scene.add("rail", Translational{out, scene.marker(scene.ground())});
+  }
+  void fourBar(double ground, double coupler, double rocker, int side)
+  {
+    const Vector3 D(ground, 0, 0), e = (D - pin).normalized(), n(-e(1), e(0), 0);
+    const double  d = (D - pin).norm(), x = (d * d + coupler * coupler - rocker * rocker) / (2 * d);
+    const Vector3 C    = pin + x * e + side * std::sqrt(coupler * coupler - x * x) * n;
+    const Body    link = scene.add("coupler", rod(pin, C)), last = scene.add("rocker", rod(C, D));
+    join(crank, link, pin);
+    join(link, last, C);
+    join(last, scene.ground(), D);
+    out = scene.markerAt(last, C);
+  }
+  Vector3 position(TS ts) const
+  {
+    Snapshot now;
+    Motion   m;
+    must(now.take(ts));
+    must(now.motion(out, &m));
+    return m.position;
+  }
+};
+
+} // namespace
+
+/* Linkages that can change to another assembly, or nearly so, go on as they do in small steps: sliders with a link as long as the crank, whose closed form is known, parallelograms and other
+   four-bars with s + l = p + q, and such with a gap there. One to three turns in one call land where 60 calls do. */
+TEST(Analyses, KinematicsThroughChangePoints)
+{
+  hhtdae::Random random(1);
+  for (int sample = 0; sample < 30; sample++) {
+    const double from = random(.2, 1.3) + M_PI / 2 * (sample % 4), gap = sample % 3 ? 0 : std::pow(10, random(-2.5, -.5)), end = 2 * M_PI * random(1, 3), a = random(1.2, 3), b = random(1.2, 3);
+    const int    side = random(-1, 1) < 0 ? -1 : 1, kind = sample % 5;
+    Vector3      at[2];
+    for (int calls : {1, 60}) {
+      CrankDriven d(from);
+      if (kind < 2) d.slider(1 + gap, side);
+      else if (kind == 2) d.fourBar(a, a, 1 + gap, side);
+      else if (kind == 3) d.fourBar(a, b, a + b - 1 - gap, side);
+      else d.fourBar(a, b, std::abs(a - b) + 1 + gap, side);
+      OwnTS run(d.scene);
+      for (int k = 1; k <= calls; k++) must(Kinematics(run.ts, k == calls ? end : end * k / calls));
+      at[calls > 1] = d.position(run.ts);
+      const double length = 1 + gap, y = std::sin(from + end), x = std::cos(from + end);
+      if (kind < 2) { /* with a link of the same length the block goes on through the middle, or stays there */
+        const double way = gap > 0 ? x + side * std::sqrt(length * length - y * y) : std::cos(from) * side > 0 ? 2 * x : 0;
+        EXPECT_NEAR(at[calls > 1](0), way, 1e-7) << sample << ", " << calls;
+      }
+    }
+    EXPECT_LT((at[1] - at[0]).norm(), 1e-7) << sample << ": gap " << gap << ", from " << from << " on " << end;
+  }
+}
+
+/* What locks is not followed to positions beyond; the message says until when it can be */
+TEST(Analyses, KinematicsOfWhatLocks)
+{
+  for (double end : {2., 6.}) { /* at 6 the crank is back where it may be */
+    CrankDriven d(.5);
+    d.fourBar(1.2, .8, .7, 1);
+    OwnTS     run(d.scene);
+    ErrorTrap error;
+    EXPECT_NE(Kinematics(run.ts, end), 0);
+    EXPECT_TRUE(error.says("no motion leads there beyond t = ")) << error.message;
+  }
+}
+
 /* Results do not depend on the unit of length: a crank with its centre of mass off its pin, in steps of 0.9 rad.
    Newton's first correction is a straight one and takes the crank off its pin. In small units this constraint
    violation is a much larger number than the initial error of the sine of the angle, although the state is nearer to

@@ -223,6 +223,9 @@ class Linearization:
     otherwise, or if `axes` is `scene.ground`, they do not rotate: a rotating axisymmetric rotor of rigid discs is steady relative to space.
     Frequencies relative to the axes of an axisymmetric rotor differ from those in space by its speed.
 
+    M, C and K are derivatives of all forces with velocities, accelerations and multipliers held at their present values: they include gyroscopic
+    and centrifugal terms, those of accelerations and of the directions of loads and reactions, but not the change of M, C and K with time.
+
     The motion of a swinging rod is steady relative to no axes. In such a state `modes()` without a count and `state_space()` describe the rates
     of small motions at this time, including the change of constraints along the motion; `response()` and `modes(count)`, which use sparse
     matrices, are valid for equilibria and steady motions only. They warn if accelerations change the state within a period of the slowest
