@@ -197,21 +197,6 @@ class Interrupted(unittest.TestCase):
             scene.set_up()
         self.assertIsNone(caught.exception.__cause__)
 
-    def test_descriptions_leave_nothing(self):
-        """What such a call was about is not there when the scene is described with other parameters, and what comes later has its place"""
-        scene = h.Scene()
-        k = scene.parameter("k", 1.)
-        body = scene.add("b", h.PointMass(velocity=(1, 0, 0)))
-        for describe in (lambda: body.marker((k, 0, 0)), lambda: scene.set_gravity((0, 0, k)), lambda: scene.add("no", h.PointMass(mass=k))):
-            with unittest.mock.patch("hhtdae.scene.plain", side_effect=LookupError), unittest.mock.patch("hhtdae.spec.plain", side_effect=LookupError):
-                with self.assertRaises(LookupError):
-                    describe()
-        scene.add("spring", h.SpringDamper(body.marker(), scene.ground.marker((0, 0, 0)), stiffness=k, length=0))
-        scene.channel("x", h.displacement(body.marker(), "x"))
-        for stiffness in (1., 4.):
-            scene.set(k=stiffness)
-            self.assertAlmostEqual(scene.solve(1., tolerance=1e-9)["x"][-1], np.sin(stiffness ** .5) / stiffness ** .5, places=5)
-
     def test_descriptions_that_are_repeated(self):
         """What was interrupted is not there, and may be described again"""
         scene = h.Scene()
