@@ -312,7 +312,8 @@ struct Integrator : StepState {
   PetscBool settings_reported  = PETSC_FALSE; /* the user has been told which settings have no effect */
 
   /* bookkeeping */
-  char             failure[512] = "";
+  char             failure[512] = ""; /* why the last attempt, start or sample has failed, for messages */
+  char             cause[512] = "";   /* the failure of the last attempt from t_n whose h was well above rounding of the time */
   char             checkpoint_file[PETSC_MAX_PATH_LEN] = "";
   char             resume_file[PETSC_MAX_PATH_LEN] = "";
   PetscInt         checkpoint_every = 0;

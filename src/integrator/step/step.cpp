@@ -37,6 +37,10 @@ constexpr PetscReal regular_decay = 0.9, limit_growth = 1.02, limit_forgotten = 
 /* Shortest h for which (vanishing_step h)^2 = (1e-28 h)^2 does not underflow (FrontDoor.RunsOfNoLength) */
 constexpr PetscReal shortest_step = 1e-120;
 
+/* What an attempt has failed for tells something of the model only if its h is longer than so many roundings of the time
+   (JointRuns.AMotionBeyondReach, which ends with such steps and is told of a wrong Jacobian otherwise) */
+constexpr PetscReal telling_roundings = 1e4;
+
 /* The run ends after so many failures for which wrong_jacobian.cpp blames the application's Jacobian; each accepted step takes
    fault_decay off their number. A single one proves nothing, as a correct model may have places where it happens; with a wrong
    Jacobian it happens again and again. */
@@ -309,8 +313,8 @@ PetscErrorCode FailStep(TS ts, const char *what)
   PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
              "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
              "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).%s",
-             (double)ts->ptime, what, (double)I.h, I.failure, (double)ts->ptime, hint);
-  PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s\n", (double)ts->ptime, what, I.failure));
+             (double)ts->ptime, what, (double)I.h, I.cause, (double)ts->ptime, hint);
+  PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s\n", (double)ts->ptime, what, I.cause));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -391,6 +395,7 @@ PetscErrorCode TSStep_HHT(TS ts)
     if (!ok || !accept) {
       accept = PETSC_FALSE;
       PetscCall(HistoryForces(ts, ts->ptime)); /* f_n again: if the application has failed to evaluate it, every attempt from t_n fails */
+      if (!rejections || I.h > telling_roundings * PETSC_MACHINE_EPSILON * PetscAbsReal(ts->ptime)) PetscCall(PetscStrncpy(I.cause, I.failure, sizeof(I.cause)));
       PetscCall(CheckRejections(ts, ++rejections));
       if (!ok) PetscCall(LowerAfterFailure(ts));
     }
