@@ -63,7 +63,7 @@ Vector3 onACross(bool part)
   RigidBody b     = rod({0, 0, 0}, {0.6, 0, -0.8});
   b.inertia       = Vector3(1e-3, 1. / 12, 1. / 12).asDiagonal();
   const Body bob  = s.add("bob", b);
-  const auto axes = [](const Vector3 &z) { return axesAlong(z); };
+  const auto axes = [](const Vector3 &z) { return hhtest::axesAlong(z); };
   const Vector3 x(1, 0, 0), y(0, 1, 0);
   if (part) {
     const Body cross = s.add("cross", nothing({0, 0, 0}));
@@ -147,14 +147,14 @@ TEST(Massless, RodsWithoutMomentAboutTheirAxes)
   Vector3 end[2];
   for (int exact = 0; exact < 2; exact++) {
     Scene  s(PETSC_COMM_SELF);
-    Marker last = s.marker(s.ground(), Vector3::Zero(), axesAlong(Vector3(0, 1, 0)));
+    Marker last = s.marker(s.ground(), Vector3::Zero(), hhtest::axesAlong(Vector3(0, 1, 0)));
     Body   body;
     for (int k = 0; k < 3; k++) {
       RigidBody b = rod(Vector3(k, 0, 0), Vector3(k + 1, 0, 0));
       b.inertia   = Vector3(exact ? 0 : 1e-9, 1. / 12, 1. / 12).asDiagonal();
       body        = s.add("rod" + std::to_string(k), b);
-      s.add("joint" + std::to_string(k), Universal{s.markerAt(body, Vector3(k, 0, 0), axesAlong(Vector3(0, 0, 1))), last});
-      last = s.markerAt(body, Vector3(k + 1, 0, 0), axesAlong(Vector3(0, 1, 0)));
+      s.add("joint" + std::to_string(k), Universal{s.markerAt(body, Vector3(k, 0, 0), hhtest::axesAlong(Vector3(0, 0, 1))), last});
+      last = s.markerAt(body, Vector3(k + 1, 0, 0), hhtest::axesAlong(Vector3(0, 1, 0)));
     }
     s.gravity({0, 2, -9.81});
     SceneRun run(s, 1, tolerance(1e-8));
