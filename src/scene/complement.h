@@ -3,6 +3,7 @@
 #define HHTDAE_SCENE_COMPLEMENT_H
 
 #include <Eigen/Core>
+#include <petscsys.h>
 #include <petscblaslapack.h>
 #include <vector>
 

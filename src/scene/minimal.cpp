@@ -144,7 +144,7 @@ Dense SolveEquilibrated(Dense W, Dense right)
   return column.asDiagonal() * right;
 }
 
-/* The metric of the masses on a basis X that changes at the rate X1: X^T M X and its rate; with the second rates X2 and M2 the second rate of it, too */
+/* The metric of the masses on the columns of a basis X, m = X^T M X, and its first and second rates m1 and m2 by those of X and M */
 struct BasisMetric {
   Dense m, m1, m2;
 
@@ -155,20 +155,33 @@ struct BasisMetric {
     m1 = twice(X1.transpose() * M * X) + X.transpose() * M1 * X;
     m2 = twice(X2.transpose() * M * X + 2 * X1.transpose() * M1 * X) + 2 * X1.transpose() * M * X1 + X.transpose() * M2 * X;
   }
+};
 
-  /* c with c^T m c = 1. Directions with next to no inertia beside the others, whose length would be rounding, stay longer. */
-  Dense unitLength() const
+/* The symmetric square root R of a metric m, and its rates by R R' + R' R = m' and R R'' + R'' R = m'' - 2 R' R' */
+struct Root {
+  Dense R, R1, R2;
+
+  /* Directions with eigenvalues of m below `least` times the largest one, such as the rotation of a thin rod about its axis, keep a constant
+     length: the eigenvalue may be rounding, and its rates would be divided by its root (Linearize.AThinRodOnABallJoint). */
+  explicit Root(const BasisMetric &metric)
   {
-    constexpr double    least = 1e-6; /* of the largest eigenvalue */
-    const PetscBLASInt  n = (PetscBLASInt)m.rows(), leading = PetscMax(n, 1), size = 64 * leading;
-    Dense               V = m;
-    Eigen::VectorXd     length(n);
+    constexpr double    least = 1e-5;
+    const PetscBLASInt  n = (PetscBLASInt)metric.m.rows(), leading = PetscMax(n, 1), size = 64 * leading;
+    Dense               V = metric.m, sums(n, n);
+    Eigen::VectorXd     root(n);
     std::vector<double> work(size);
     PetscBLASInt        info = 0;
-    LAPACKsyev_("V", "U", &n, V.data(), &leading, length.data(), work.data(), &size, &info);
-    if (info || !n || !(length(n - 1) > 0)) return Dense::Identity(n, n);
-    for (PetscBLASInt k = 0; k < n; k++) length(k) = 1 / std::sqrt(std::max(length(k), least * length(n - 1)));
-    return V * length.asDiagonal() * V.transpose();
+    LAPACKsyev_("V", "U", &n, V.data(), &leading, root.data(), work.data(), &size, &info);
+    if (info) root.setConstant(NAN);
+    const double smallest = n ? least * root(n - 1) : 0;
+    const auto   keeps    = [&](PetscBLASInt k) { return !(V.col(k).dot(metric.m * V.col(k)) > smallest); };
+    for (PetscBLASInt k = 0; k < n; k++) root(k) = std::sqrt(std::max(root(k), smallest));
+    for (PetscBLASInt k = 0; k < n; k++)
+      for (PetscBLASInt i = 0; i < n; i++) sums(i, k) = keeps(i) || keeps(k) ? INFINITY : root(i) + root(k);
+    const auto solve = [&](const Dense &right) { return Dense(V * (V.transpose() * right * V).cwiseQuotient(sums) * V.transpose()); };
+    R  = V * root.asDiagonal() * V.transpose();
+    R1 = solve(metric.m1);
+    R2 = solve(metric.m2 - 2 * R1 * R1);
   }
 };
 
@@ -190,25 +203,28 @@ void ToUnits(Minimal &m, Dense &M, Dense &C, Dense &K, const std::vector<PetscIn
     for (Eigen::Index i = 0; i < X->rows(); i++) X->row(i) = m.unit(constraints[i]) * X->row(i) * m.unit.asDiagonal();
 }
 
-/* The states X (z, y, s) in place of (z, y, s): with c^T m c = 1, R R = c^T m(t) c and E the coordinates of the columns of L in the basis N they are R c^{-1} z, whose rate is
-   E^T (R c^{-1} z)' where rows at velocity level leave it, and s. A = X' X^{-1} + X A X^{-1}. across: L^T M N */
-void InUnitsOfMass(Minimal &m, Eigen::Index inputs, const BasisMetric &positions, const BasisMetric &velocities, const Dense &across)
+/* Replaces the states (z, y, s) by X (z, y, s) = (w, E w', s), where w = R z has the length of the metric of the masses, R R = N^T M N at all
+   times. E expresses rates of w in the directions L that constraints on velocities leave; without such constraints it is 1, and the second
+   states are the rates of the first. Then A becomes X' X^{-1} + X A X^{-1}. across: L^T M N */
+PetscErrorCode InUnitsOfMass(MPI_Comm comm, Minimal &m, Eigen::Index inputs, const Root &z, const Root &y, const Dense &across)
 {
   const Eigen::Index nz = m.dz(), ny = m.dy(), n = m.states();
-  const Dense        c = positions.unitLength(), d = velocities.unitLength(), E = d.transpose() * across * c, m1 = c.transpose() * positions.m1 * c;
-  const Dense        R1 = m1 / 2, R2 = c.transpose() * positions.m2 * c / 2 - m1 * m1 / 4, toz = SolveEquilibrated(c, Dense::Identity(nz, nz)), toy = SolveEquilibrated(d, Dense::Identity(ny, ny));
+  const Dense        E = SolveEquilibrated(y.R, SolveEquilibrated(z.R, across.transpose()).transpose());
   Dense              X = Dense::Identity(n, n), X1 = Dense::Zero(n, n);
-  X.topLeftCorner(nz, nz)   = toz;
-  X.block(nz, 0, ny, nz)    = E * R1 * toz;
-  X.block(nz, nz, ny, ny)   = toy;
-  X1.topLeftCorner(nz, nz)  = R1 * toz;
-  X1.block(nz, 0, ny, nz)   = E * R2 * toz;
-  X1.block(nz, nz, ny, ny)  = d.transpose() * velocities.m1 * d / 2 * toy;
-  const Dense back          = SolveEquilibrated(X, Dense::Identity(n, n));
-  m.A                       = (X1 + X * m.A) * back;
-  m.B                       = X * m.B;
-  m.original                = Dense::Identity(n + inputs, n + inputs);
+  PetscFunctionBegin;
+  X.topLeftCorner(nz, nz)  = z.R;
+  X.block(nz, 0, ny, nz)   = E * z.R1;
+  X.block(nz, nz, ny, ny)  = y.R;
+  X1.topLeftCorner(nz, nz) = z.R1;
+  X1.block(nz, 0, ny, nz)  = E * z.R2;
+  X1.block(nz, nz, ny, ny) = y.R1;
+  const Dense back         = SolveEquilibrated(X, Dense::Identity(n, n));
+  PetscCheck(back.allFinite(), comm, PETSC_ERR_MAT_LU_ZRPVT, "Linearization: the mass matrix is singular in directions that the constraints leave free");
+  m.A                            = (X1 + X * m.A) * back;
+  m.B                            = X * m.B;
+  m.original                     = Dense::Identity(n + inputs, n + inputs);
   m.original.topLeftCorner(n, n) = back;
+  PetscFunctionReturn(0);
 }
 
 PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation> &in, Minimal &m)
@@ -304,7 +320,8 @@ PetscErrorCode Reduce(const Linearization::Work &w, const std::vector<Excitation
 
   const Dense mass = Block(M, m.q, m.q), mass_rate = Block(rates.M, m.q, m.q), N1 = position.least(-of_v_rate.topRows(h) * m.N);
   const Dense N2 = position.least(-2 * of_v_rate.topRows(h) * N1 - second.topRows(h) * m.N) - m.N * (N1.transpose() * N1);
-  InUnitsOfMass(m, nf, {m.N, N1, N2, mass, mass_rate, Block(rates.second_M, m.q, m.q)}, {m.L, turn, Dense::Zero(nq, m.dy()), mass, mass_rate, Dense::Zero(nq, nq)}, m.L.transpose() * mass * m.N);
+  const BasisMetric positions(m.N, N1, N2, mass, mass_rate, Block(rates.second_M, m.q, m.q)), velocities(m.L, turn, Dense::Zero(nq, m.dy()), mass, mass_rate, Dense::Zero(nq, nq));
+  PetscCall(InUnitsOfMass(w.comm(), m, nf, Root(positions), Root(velocities), m.L.transpose() * mass * m.N));
   PetscFunctionReturn(0);
 }
 

@@ -349,3 +349,24 @@ TEST(Linearize, RollingDisc)
     EXPECT_LT(found, 1e-6 * std::abs(square)) << rate << ": " << square;
   }
 }
+
+/* A thin rod that swings on a ball joint: its rotation about its own axis has next to no inertia, and how little does not matter to the modes */
+TEST(Linearize, AThinRodOnABallJoint)
+{
+  std::vector<double> found[2];
+  for (int thinner : {0, 1}) {
+    Scene         scene(PETSC_COMM_SELF);
+    const Matrix3 A    = Eigen::AngleAxisd(0.7, Vector3(1, 2, 3).normalized()).toRotationMatrix();
+    RigidBody     b    = body(1, {thinner ? 1e-12 : 1e-7, 1. / 12, 1. / 12}, A * Vector3(0.5, 0, 0));
+    b.rotation         = A;
+    b.angular_velocity = A * Vector3(0, 3, -2);
+    b.velocity         = b.angular_velocity.cross(b.position);
+    scene.gravity({0, -9.81, 0});
+    const Body rod = scene.add("rod", b);
+    scene.add("ball", Spherical{scene.marker(rod, {-0.5, 0, 0}), scene.marker(scene.ground())});
+    const Started start(scene);
+    for (const Mode &mode : start.modes()) found[thinner].push_back(std::abs(mode.value));
+  }
+  ASSERT_EQ(found[0].size(), found[1].size());
+  for (std::size_t k = 0; k < found[0].size(); k++) EXPECT_NEAR(found[0][k], found[1][k], 1e-3) << k;
+}
