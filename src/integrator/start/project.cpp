@@ -104,7 +104,8 @@ PetscErrorCode ReportInconsistency(TS ts, const char *what, const char *unit, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tolerances by which positions that a step has left may miss constraints that have jumped: the first step goes on from 2 and less, and none from 5 and more */
+/* Largest violation of constraints that the application has changed with which a run goes on, in tolerances: steps succeed from 2 and less, and
+   fail from 5 and more (Parameters.AMotionThatJumps) */
 constexpr PetscReal largest_jump = 4;
 
 /* An error where a constraint has jumped and is not to be followed by projecting the positions (Parameters.AMotionThatJumps) */
