@@ -28,6 +28,10 @@ struct RowRates : RowValues {
   }
 };
 
+/* Largest difference of spins, relative to the fastest, for which flexible bodies count as turning alike; largest spin, relative to the lowest
+   frequency of a flexible body, that does not affect its modes (SmallBodies.AxesOfSeveralBodies) */
+constexpr double same_spin_tolerance = 1e-2, slow_spin_ratio = 1e-4;
+
 struct Linearization::Work {
   TS                         start = nullptr; /* for a run that has not begun: a copy, BeginCopy(), that provides accelerations and multipliers */
   Runtime                   *R = nullptr;

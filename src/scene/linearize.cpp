@@ -192,9 +192,6 @@ PetscErrorCode Linearization::Work::check(const char *call, const Mode &m) const
    because modal coordinates are in the bodies' axes */
 PetscErrorCode Linearization::Work::chooseAxes(Body of)
 {
-  /* largest difference of the bodies' spins relative to the fastest one for a common spin; largest spin relative to the
-     lowest eigenfrequency of a flexible body that does not affect modes (SmallBodies.AxesOfSeveralBodies) */
-  constexpr double    same_spin_tolerance = 1e-2, slow_spin_ratio = 1e-4;
   const SceneData &s     = R->scene;
   Vec              at[3] = {state[0], state[1], state[2]};
   double              fastest = 0, angular_difference = 0, slowest = INFINITY;

@@ -1,6 +1,6 @@
 /*
-  Whether the state of a linearization is steady as seen from its axes: velocities are then constant vectors of these axes, a = W x v and w' = W x w for axes that turn with W, and modal
-  coordinates, which are in axes of their bodies, have no accelerations.
+  How far the state of a linearization is from being steady in its axes. In a steady motion velocities are constant vectors of these axes,
+  a = W x v and w' = W x w for axes that turn with W, and modal coordinates, which are in axes of their bodies, have no accelerations.
 */
 #include "extension.h"
 #include "linearization.h"
@@ -50,12 +50,10 @@ std::string NameOf(const SceneData &s, PetscInt part)
   return part < 0 ? std::string() : part < bodies ? s.bodies[part].name : s.extensions[part - bodies]->bodyName();
 }
 
-/* Own bodies, whose motion is that of the state. A body's modal coordinates belong to axes that turn with it. Axes that are the mean of all flexible bodies' differ from them by up to a
-   hundredth, and turning by less than 1e-4 of its lowest frequency changes no mode of a body, as linearize.cpp has it. */
+/* Own bodies. Modal coordinates belong to axes that turn with their body; differences of spins that chooseAxes() tolerates do not count. */
 void OfBodies(const Linearization::Work &w, const Evaluation &at, Changes *x)
 {
-  constexpr double same_spin_tolerance = 1e-2, slow_spin_ratio = 1e-4;
-  const Bodies    &bodies = w.R->bodies;
+  const Bodies &bodies = w.R->bodies;
   for (PetscInt b = 0; b < bodies.own; b++) {
     const LocalBody  &body = bodies.body[b];
     const BodyData   &data = w.R->scene.bodies[body.id];
