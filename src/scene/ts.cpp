@@ -202,9 +202,12 @@ PetscErrorCode Scene::createTS(TS *ts)
 
 static PetscErrorCode RowName(TS, PetscInt row, char name[], size_t len, void *ctx)
 {
+  const Runtime &R = *static_cast<Runtime *>(ctx);
   PetscFunctionBegin;
   PetscCall(Guarded([&] {
-    PetscCall(PetscStrncpy(name, UnknownName(*static_cast<Runtime *>(ctx)->model, row).c_str(), len));
+    std::string text = UnknownName(*R.model, row);
+    if (R.bad_force >= 0) text += std::string("; ") + R.scene.elements[R.bad_force].type + " " + R.scene.elements[R.bad_force].name + " is not a number";
+    PetscCall(PetscStrncpy(name, text.c_str(), len));
     return PetscErrorCode(0);
   }));
   PetscFunctionReturn(0);

@@ -15,7 +15,7 @@ struct NamedRods {
   Body  first, second;
   bool  torn = false;
 
-  explicit NamedRods(Space space = Space::Spatial) : scene(PETSC_COMM_SELF, space)
+  explicit NamedRods(Space space = Space::Spatial, bool force_states = true) : scene(PETSC_COMM_SELF, space)
   {
     RigidBody b;
     b.mass     = 2;
@@ -31,7 +31,7 @@ struct NamedRods {
     UserForce f;
     f.i     = scene.marker(second);
     f.force = {Expression{{Measure::time()}, [this](const Real *k) -> Real { return torn && k[0].value() > .05 ? Real(NAN) : Real(0); }}, Expression(Measure::value(s)), Expression(Measure::value(s))};
-    f.state = true;
+    f.state = force_states;
     scene.add("thrust", f);
     scene.gravity({0, -9.81, 0});
   }
@@ -86,16 +86,45 @@ TEST(UnknownNames, BesideDroppedRows)
   for (const std::string &name : n) EXPECT_EQ(name.find("again"), std::string::npos);
 }
 
+/* The message of a run that ends with an error */
+std::string MessageOf(Scene &scene)
+{
+  TS ts;
+  must(scene.createTS(&ts));
+  must(TSSetMaxTime(ts, 1));
+  ErrorTrap trap;
+  EXPECT_NE(scene.solve(ts), 0);
+  TSDestroy(&ts);
+  return trap.message;
+}
+
+/* Without force states the row is that of the body, and the force is named beside it */
 TEST(UnknownNames, OfAForceThatIsNoNumber)
 {
-  NamedRods r;
-  TS        ts;
-  r.torn = true;
-  must(r.scene.createTS(&ts));
-  must(TSSetMaxTime(ts, 1));
-  must(TSSetMaxSNESFailures(ts, 3));
-  ErrorTrap trap;
-  EXPECT_NE(r.scene.solve(ts), 0);
-  EXPECT_TRUE(trap.says("component 1 of ") && trap.says(" thrust)")) << trap.message;
-  TSDestroy(&ts);
+  for (bool states : {true, false}) {
+    NamedRods r(Space::Spatial, states);
+    r.torn                    = true;
+    const std::string message = MessageOf(r.scene);
+    EXPECT_EQ(message.find("component 1 of ") != std::string::npos, states) << message;
+    EXPECT_NE(message.find(states ? " thrust" : " thrust is not a number)"), std::string::npos) << message;
+    EXPECT_EQ(message.find("locks"), std::string::npos) << message;
+  }
+}
+
+/* A driven crank that cannot turn on: the shortest link is the rocker. Joints of the four-bar alone do not lock; the motion is named that asks for it. */
+TEST(UnknownNames, OfAMotionThatLocks)
+{
+  Scene         scene(PETSC_COMM_SELF, Space::Planar);
+  const Vector3 A(0, 0, 0), B(0, 1, 0), C(1.5, 1.2, 0), D(2.6, 0, 0);
+  const Body    crank = scene.add("crank", rod(A, B)), coupler = scene.add("coupler", rod(B, C)), rocker = scene.add("rocker", rod(C, D));
+  const Marker  i = scene.markerAt(crank, A), j = scene.marker(scene.ground(), A);
+  scene.add("bearing", Revolute{i, j});
+  scene.add("pin B", Revolute{scene.markerAt(coupler, B), scene.markerAt(crank, B)});
+  scene.add("pin C", Revolute{scene.markerAt(rocker, C), scene.markerAt(coupler, C)});
+  scene.add("pin D", Revolute{scene.markerAt(rocker, D), scene.marker(scene.ground(), D)});
+  scene.add("drive", RotationalMotion{i, j, TimeFunction::polynomial({0, 2})});
+  scene.start().assembly    = Assembly::Project;
+  const std::string message = MessageOf(scene);
+  EXPECT_NE(message.find("locks"), std::string::npos) << message;
+  EXPECT_NE(message.find("(rotational motion drive: row 1 of 1 (driven angle)) depends on time"), std::string::npos) << message;
 }
