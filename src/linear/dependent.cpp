@@ -17,9 +17,6 @@
 /* E relative to an estimate of the diagonal of S: small compared with the nonzero eigenvalues of S, large compared with rounding */
 static const PetscReal REGULARIZATION = 1e-9;
 
-/* |B^T lambda| relative to |B| |lambda| below which lambda counts as a null vector; all three norms scaled as S is */
-static const PetscReal NULL_RESIDUAL = 1e-9;
-
 /* A row takes part in a dependence if its entry of the null vector, relative to the largest one, is larger than this */
 static const PetscReal MIN_COMPONENT = 1e-6;
 
@@ -214,7 +211,7 @@ static PetscErrorCode Collect(Dependence *t, PetscInt max, PetscInt *n, PetscInt
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode LinearNameDependent(Mat P, IS multipliers, PetscInt max, PetscInt *n, PetscInt rows[])
+PetscErrorCode LinearNameDependent(Mat P, IS multipliers, PetscReal tolerance, PetscInt max, PetscInt *n, PetscInt rows[])
 {
   Dependence t = {};
   PetscInt   count;
@@ -232,7 +229,7 @@ PetscErrorCode LinearNameDependent(Mat P, IS multipliers, PetscInt max, PetscInt
   PetscCall(Create(&t));
   PetscCall(Iterate(&t, &residual));
   PetscCall(PetscInfo(P, "Null vector of the constraints: residual %g\n", (double)residual));
-  if (residual <= NULL_RESIDUAL) PetscCall(Collect(&t, max, n, rows));
+  if (residual <= tolerance) PetscCall(Collect(&t, max, n, rows));
   PetscCall(Destroy(&t));
   if (triangle) PetscCall(MatDestroy(&t.P));
   PetscFunctionReturn(0);

@@ -83,9 +83,10 @@ PetscErrorCode LinearIsSymmetric(Mat A, PetscBool *symmetric);
 /* Whether a package is known to exchange rows where a pivot is zero, as multipliers, whose diagonal entries are zero, need it */
 PetscErrorCode LinearExchangesRows(const char package[], PetscBool *yes);
 
-/* For a singular saddle-point matrix: at most max global rows of multipliers that take part in linearly dependent constraints,
-   from the null space of Phi_q^T by inverse iteration on the regularized matrix (dependent.cpp).
+/* For a saddle-point matrix that is singular, or nearly so: at most max global rows of multipliers that take part in linearly dependent
+   constraints, from the null space of Phi_q^T by inverse iteration on the regularized matrix (dependent.cpp). tolerance: |Phi_q^T lambda|
+   relative to |Phi_q| |lambda|, scaled by the diagonal of the matrix, up to which lambda counts as a null vector.
    Sets *n = 0 if no dependence is found. Collective; every rank gets the same list. */
-PetscErrorCode LinearNameDependent(Mat P, IS multipliers, PetscInt max, PetscInt *n, PetscInt rows[]);
+PetscErrorCode LinearNameDependent(Mat P, IS multipliers, PetscReal tolerance, PetscInt max, PetscInt *n, PetscInt rows[]);
 
 #endif

@@ -220,7 +220,7 @@ std::vector<PetscInt> dependent(const Triplets &entries, PetscInt first_multipli
   std::vector<PetscInt> rows(max);
   EXPECT_EQ(create_matrix(entries, &A), 0);
   EXPECT_EQ(ISCreateStride(PETSC_COMM_SELF, entries.n - first_multiplier, first_multiplier, 1, &multipliers), 0);
-  EXPECT_EQ(LinearNameDependent(A, multipliers, max, &n, rows.data()), 0);
+  EXPECT_EQ(LinearNameDependent(A, multipliers, 1e-9, max, &n, rows.data()), 0);
   EXPECT_EQ(ISDestroy(&multipliers), 0);
   EXPECT_EQ(MatDestroy(&A), 0);
   rows.resize(n);

@@ -4,6 +4,7 @@
 #define HHTDAE_START_H
 
 #include "consistent.h"
+#include <string>
 
 namespace hht3
 {
@@ -44,6 +45,9 @@ PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);
 
 /* Of use to the files of the start alone, from here on. Where no solve with that matrix is possible, NameRedundant() is the error that says why. */
 PetscErrorCode NameRedundant(TS ts);
+
+/* Where no step from t_n succeeds: a sentence about constraints that nearly depend on one another there, if there are any */
+PetscErrorCode ExplainLock(TS ts, std::string *text);
 
 /* ts->time_step from U0, V0, A0 and the rates of a consistent start, where the user has set none, also not since the set-up */
 PetscErrorCode ChooseFirstStep(TS ts, Vec rate);

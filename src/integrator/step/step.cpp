@@ -21,6 +21,7 @@
 #include "integrator/start/start.h"
 #include "step.h"
 #include "integrator/work_vec.h"
+#include <string>
 #include <utility>
 
 namespace hht3
@@ -305,7 +306,8 @@ PetscErrorCode FailStep(TS ts, const char *what)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  const char *hint = I.constraints() && RelativeDamping(I.p.rho) < 0.1 ? " At this alpha or spectral radius hardly anything damps the multipliers' oscillation, which may be the cause: -ts_hhtdae_alpha -0.05." : "";
+  std::string hint = I.constraints() && RelativeDamping(I.p.rho) < 0.1 ? " At this alpha or spectral radius hardly anything damps the multipliers' oscillation, which may be the cause: -ts_hhtdae_alpha -0.05." : "";
+  if (hint.empty()) PetscCall(ExplainLock(ts, &hint));
   if (!ts->reason) ts->reason = TS_DIVERGED_STEP_REJECTED;
   ts->steprestart = PETSC_TRUE; /* if the run goes on from here, it does so with a consistent start */
   PetscCall(VecCopy(I.U0, ts->vec_sol));
@@ -313,8 +315,8 @@ PetscErrorCode FailStep(TS ts, const char *what)
   PetscCheck(!ts->errorifstepfailed, PetscObjectComm((PetscObject)ts), PETSC_ERR_NOT_CONVERGED,
              "No step from t = %g succeeded: %s; last h = %g. Last cause: %s. The solution holds the last accepted state, at t = %g "
              "(-ts_error_if_step_fails 0 returns it with a TSConvergedReason).%s",
-             (double)ts->ptime, what, (double)I.h, I.cause, (double)ts->ptime, hint);
-  PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s\n", (double)ts->ptime, what, I.cause));
+             (double)ts->ptime, what, (double)I.h, I.cause, (double)ts->ptime, hint.c_str());
+  PetscCall(PetscInfo(ts, "no step from t = %g succeeded: %s; last cause: %s.%s\n", (double)ts->ptime, what, I.cause, hint.c_str()));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
