@@ -1,5 +1,5 @@
-/* Setters and getters. As in every PETSc type that may be loaded as a plugin, each one reaches its type through the object's
-   function list (setters.cpp), so that it does nothing when the TS is of another type. */
+/* The public setters and getters. They call functions composed with the TS (setters.cpp), which is PETSc's way for
+   types that may be plugins: on a TS of another type the setters do nothing, and the getters raise an error. */
 #include "integrator/compat.h"
 #include "hhtdae/hhtdae.h"
 
@@ -18,10 +18,11 @@
   Level: intermediate
 
   Notes:
-  The paper's form (9a) divides M q'' at t_{n+1} by 1+alpha and averages all other forces between both ends of the step. Where
-  M depends on q and alpha is not 0 it is of first order. The second-order form satisfies the equations of motion at t_{n+1}
-  and averages an algorithmic acceleration. For constant M and constant steps both have the same positions. The accelerations of
-  the paper's form, and at other steps its positions, are of first order.
+  The paper's form (9a) divides M q'' at t_{n+1} by 1+alpha and averages all other forces between both ends of
+  the step. Where M depends on q and alpha is not 0, this form is of first order. The second-order form satisfies the
+  equations of motion at t_{n+1} and averages an algorithmic acceleration. For constant M and constant steps both give
+  the same positions. The accelerations of the paper's form are of first order, and so are its positions at variable
+  steps.
 
 .seealso: `TSHHT3`, `TSHHT3SetAlpha()`, `TSHHT3SetRadius()`
 @*/
@@ -72,8 +73,9 @@ PetscErrorCode TSHHT3GetForm(TS ts, TSHHT3Form *form)
   Level: beginner
 
   Notes:
-  alpha = 0 is the trapezoidal rule, without damping and weakly unstable on constrained systems; the smaller alpha, the more
-  are high frequencies damped: the spectral radius at infinity is (1+alpha)/(1-alpha). An error is raised outside the range.
+  alpha = 0 is the trapezoidal rule, without damping and weakly unstable on constrained systems. The smaller
+  alpha, the stronger the damping of high frequencies: the spectral radius at infinity is (1+alpha)/(1-alpha). A value
+  outside the range is an error.
 
 .seealso: `TSHHT3`, `TSHHT3GetAlpha()`, `TSHHT3SetRadius()`
 @*/
@@ -125,7 +127,7 @@ PetscErrorCode TSHHT3GetAlpha(TS ts, PetscReal *alpha)
   Level: intermediate
 
   Note:
-  alpha_m = (2 rho - 1)/(rho + 1), alpha_f = rho/(rho + 1). Belongs to the second-order form; replaces alpha.
+  alpha_m = (2 rho - 1)/(rho + 1), alpha_f = rho/(rho + 1). The radius requires the second-order form and replaces alpha.
 
 .seealso: `TSHHT3`, `TSHHT3SetAlpha()`, `TSHHT3SetForm()`
 @*/
@@ -139,7 +141,7 @@ PetscErrorCode TSHHT3SetRadius(TS ts, PetscReal rho)
 }
 
 /*@
-  TSHHT3SetOrder - Sets the order of `TSHHT3`, or has it chosen in each step
+  TSHHT3SetOrder - Sets the order of `TSHHT3`, or lets it be chosen in each step
 
   Logically Collective, before `TSSetUp()`
 
@@ -153,19 +155,23 @@ PetscErrorCode TSHHT3SetRadius(TS ts, PetscReal rho)
   Level: intermediate
 
   Notes:
-  Order 2, the default, is HHT. Orders 3 to 5 are backward differentiation of positions and of velocities over variable steps, with the same unknowns and the same matrix
-  but for beta and gamma. They start with steps of order 2, also after events and other restarts, and take from the history what is there.
-  A step whose correction fails is repeated with order 2.
+  Order 2, the default, is HHT. Orders 3 to 5 are backward differentiation of positions and of velocities over
+  variable steps. They have the same unknowns and the same matrix, with other beta and gamma. The first steps, also
+  those after events and other restarts, are of order 2; the order then rises as the history grows. A step whose
+  correction fails is repeated with order 2.
 
-  `TSHHT3_ORDER_AUTO` takes from step to step the order with which the next one may be longest, as long as differences of the positions fall with their order. Where they
-  do not, a motion with h omega near one or above is active, for which orders above 2 are not stable at small damping: then it is HHT for a while.
-  A fixed order of 3 or more has no such guard: it suits smooth or well damped motion alone.
+  `TSHHT3_ORDER_AUTO` chooses in each step the order that allows the longest next step, as long as scaled differences of
+  the positions decrease with their order. If they do not, the motion contains a frequency omega with h omega near or
+  above one, for which orders above 2 are unstable at small damping: HHT is then used for a number of steps. A fixed
+  order of 3 or more has no such guard: it suits smooth or well damped motion only.
 
-  In smooth motion positions, velocities, and at constant steps accelerations and multipliers converge with the order, where error control chooses the first steps: at
-  given steps these, of order two, leave an error of h^3. A change of h leaves an error in accelerations and multipliers that is one
-  order lower for as many steps as the order has. They do not enter the error test.
+  In smooth motion positions and velocities converge with the order k, and so do accelerations and multipliers at
+  constant steps. This holds if error control chooses the first steps; first steps of a given length, which are of order
+  2, leave an error of h^3. After a change of h the error of accelerations and multipliers is one order lower for k
+  steps. Accelerations and multipliers do not enter the error test.
 
-  Orders above 2 need the second-order form. They need the attitudes of as many steps within half a turn, where there are local rotation vectors (`TSHHT3SetRotations()`): of fast spins the order is lower.
+  Orders above 2 need the second-order form. With local rotation vectors (`TSHHT3SetRotations()`) order k needs the
+  attitudes of the last k steps to lie within half a turn, so that the order is lower for fast spins.
 
 .seealso: `TSHHT3`, `TSHHT3GetOrder()`, `TSHHT3SetAlpha()`, `TSHHT3GetStatistics()`
 @*/
@@ -218,11 +224,12 @@ PetscErrorCode TSHHT3GetOrder(TS ts, PetscInt *order)
   Level: advanced
 
   Notes:
-  What the iteration leaves in q excites an oscillation of the multipliers, which grows by 1/(1-rho)^2 before it dies out, rho =
-  (1+alpha)/(1-alpha). Unless c is set, a system with constraints therefore takes 0.001 times min(1, ((1-rho)/(1-rho_0))^2) with
-  rho_0 that of alpha = -0.05: 1.7e-4 at alpha = -0.02, 4.3e-5 at -0.01, and not below 1e-8. -ts_view shows it.
+  The error that the iteration leaves in q excites an oscillation of the multipliers, which grows by a factor of
+  1/(1-rho)^2 before it decays, where rho = (1+alpha)/(1-alpha). Unless c is set, a system with constraints therefore
+  takes 0.001 min(1, ((1-rho)/(1-rho_0))^2), where rho_0 is the rho of alpha = -0.05: 1.7e-4 at alpha = -0.02, 4.3e-5 at
+  -0.01, and at least 1e-8. -ts_view shows the value.
 
-  A value that is set is used as it is.
+  If c is set it is used unchanged.
 
 .seealso: `TSHHT3`, `TSSetTolerances()`
 @*/
@@ -242,7 +249,8 @@ PetscErrorCode TSHHT3SetCorrectorTolerance(TS ts, PetscReal c)
 
   Input Parameters:
 + ts     - the `TS` context
-- degree - 0 to 3, or -1 (default) to choose it in each step by which degree would have served best in the last one; above order two up to the largest order
+- degree - 0 to 3, or -1 (default): in each step the degree that would have predicted the last step
+           best, at most 3 or, above order two, the largest order
 
   Options Database Key:
 . -ts_hhtdae_predictor_degree <degree> - the degree
@@ -261,15 +269,15 @@ PetscErrorCode TSHHT3SetPredictorDegree(TS ts, PetscInt degree)
 }
 
 /*@
-  TSHHT3SetReuse - Sets when the Newton matrix is made anew
+  TSHHT3SetReuse - Sets when a new Newton matrix is made
 
   Logically Collective
 
   Input Parameters:
 + ts    - the `TS` context
 . ratio - factor by which h may differ from the h of the matrix, at least 1, default 1.4
-. rate  - rate of convergence beyond which the next step gets a new matrix; 0 renews it in every step; default 0.25, with the preconditioner hhtconstraint 0.1
-- hold  - growth of h that is not taken, so that the factorization lives on, at least 1, default 1.2
+. rate  - rate of convergence above which the next step gets a new matrix; 0 makes one in every step; default 0.25, or 0.1 with hhtconstraint
+- hold  - h stays as it is if it could grow by less than this factor, so that the factorization can be reused; at least 1, default 1.2
 
   Options Database Key:
 . -ts_hhtdae_reuse <ratio,rate,hold> - the three numbers
@@ -277,8 +285,8 @@ PetscErrorCode TSHHT3SetPredictorDegree(TS ts, PetscInt degree)
   Level: advanced
 
   Note:
-  A correction that fails with an old matrix is repeated once with a new one before h is cut. -snes_lag_jacobian, if given,
-  replaces all this.
+  A correction that fails with an old matrix is repeated once with a new one before h is reduced.
+  -snes_lag_jacobian, if given, replaces these rules.
 
 .seealso: `TSHHT3`, `SNESSetLagJacobian()`
 @*/
@@ -294,22 +302,22 @@ PetscErrorCode TSHHT3SetReuse(TS ts, PetscReal ratio, PetscReal rate, PetscReal 
 }
 
 /*@
-  TSHHT3SetIS - Says which unknowns have a role
+  TSHHT3SetIS - Sets the unknowns that have a role
 
   Collective
 
   Input Parameters:
 + ts   - the `TS` context
 . role - the role, see `TSHHT3Role`
-- is   - global indices of the unknowns in U that have it, each on the rank that owns it; `NULL` takes an earlier set back
+- is   - global indices of the unknowns in U that have it, each on the rank that owns it; `NULL` removes an earlier set
 
   Level: intermediate
 
   Notes:
-  Row i of the residual is the equation of unknown i. Unknowns that no index set names are coordinates. If no index set is
-  given at all the roles are detected from dF/dU, dF/dU' and dF/dU'' at the start. Overlapping sets, indices that the rank
-  does not own, rows of constraints that depend on accelerations and of holonomic ones that depend on velocities are errors,
-  raised in `TSSetUp()`, which asks the residual three times for that.
+  Row i of the residual is the equation of unknown i. Unknowns that are in no index set are coordinates. If no
+  index set is given at all the roles are detected from dF/dU, dF/dU' and dF/dU'' at the start. `TSSetUp()` raises an
+  error for overlapping sets, indices that the rank does not own, rows of constraints that depend on accelerations, and
+  rows of holonomic constraints that depend on velocities; it evaluates the residual three times to find such rows.
 
 .seealso: `TSHHT3`, `TSHHT3GetIS()`
 @*/
@@ -351,7 +359,7 @@ PetscErrorCode TSHHT3GetIS(TS ts, TSHHT3Role role, IS *is)
 }
 
 /*@
-  TSHHT3SetStart - Says what to do about initial positions and velocities that violate the constraints
+  TSHHT3SetStart - Sets what is done if initial positions and velocities violate the constraints
 
   Logically Collective
 
@@ -365,13 +373,15 @@ PetscErrorCode TSHHT3GetIS(TS ts, TSHHT3Role role, IS *is)
   Level: intermediate
 
   Note:
-  The violation is measured as the distance to the nearest consistent state in the metric of the mass matrix, in units of the tolerance.
-  `TSHHT3_START_REPORT` prints it if it exceeds 1 at the start of a run, and 100 at a restart within it, where velocities are consistent to the order of the method only;
-  `TSHHT3_START_PROJECT` prints nothing. -info shows it always. Accelerations and multipliers are made consistent in any case.
+  The violation is measured as the distance to the nearest consistent state in the metric of the mass matrix, in
+  units of the tolerance. `TSHHT3_START_REPORT` prints it if it exceeds 1 at the start of a run, or 100 at a restart
+  within the run, where velocities are consistent to the order of the method only; `TSHHT3_START_PROJECT` prints
+  nothing. -info always shows it. Accelerations and multipliers are made consistent in any case.
 
-  A restart from values that the integrator itself has left (`TSRestartStep()`, events) projects the velocities, unless the choice is
-  `TSHHT3_START_OFF`: those of a step meet the constraints to second order, which multipliers would answer with oscillations of first order. Where an
-  event has added constraints this is a plastic impact.
+  A restart from values that the integrator has computed (`TSRestartStep()`, events) projects the velocities, unless the
+  choice is `TSHHT3_START_OFF`: the velocities of a step satisfy the constraints to second order only, which would
+  excite oscillations of first order in the multipliers. If an event has added constraints, the projection is a plastic
+  impact.
 
 .seealso: `TSHHT3`, `TSRestartStep()`
 @*/
@@ -428,13 +438,15 @@ PetscErrorCode TSHHT3GetAcceleration(TS ts, Vec *A)
   Level: intermediate
 
   Notes:
-  At both ends the values of the step itself are returned, to the last bit.
+  At both ends of the step the result is bitwise that of the step.
 
-  Within a step of order two coordinates, velocities and states are cubic Hermite polynomials; accelerations, derivatives of states, multipliers, variables and force states are linear.
-  What is linear is only as good as the step is short; `TSHHT3EvaluateAt()` solves for it.
+  Within a step of order two coordinates, velocities and states are cubic Hermite polynomials; accelerations,
+  derivatives of states, multipliers, variables and force states are linear. The linear interpolation is accurate only
+  if the step is short; `TSHHT3EvaluateAt()` solves for these values instead.
 
-  Within a step of order k above two (`TSHHT3SetOrder()`) all of them are polynomials of degree k through values at the ends of the last steps, accelerations, derivatives of states, multipliers,
-  variables and force states of a lower degree where the history reaches back less far.
+  Within a step of order k above two (`TSHHT3SetOrder()`) all of them are polynomials of degree k through values at the
+  ends of the last steps. For accelerations, derivatives of states, multipliers, variables and force states the degree
+  is lower where their history is shorter.
 
 .seealso: `TSHHT3`, `TSHHT3EvaluateAt()`, `TSInterpolate()`, `TSHHT3GetAcceleration()`
 @*/

@@ -1,4 +1,4 @@
-/* The front door: registration, creation, options, set-up, view, destruction. Setters and getters stand in api.cpp. */
+/* The type TSHHT3: registration, creation, options, set-up, view, destruction. Its setters and getters are in api.cpp. */
 #include "integrator/checkpoint/checkpoint.h"
 #include "integrator/step/corrector.h"
 #include "integrator/step/dense.h"
@@ -52,7 +52,7 @@ PetscErrorCode DuplicateAll(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What only some problems need */
+/* Vectors that only some problems need */
 PetscErrorCode AllocateForRoles(TS ts)
 {
   Integrator &I = Get(ts);
@@ -72,14 +72,14 @@ PetscErrorCode CheckProblem(TS ts)
   PetscFunctionBegin;
   PetscCall(TSGetDM(ts, &dm));
   PetscCall(DMGetDMTS(dm, &tdm));
-  PetscCheck(tdm->ops->i2function || tdm->ops->ifunction /* PETSc's convention for second-order types: then it is F(t,U,U'') */, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
+  PetscCheck(tdm->ops->i2function || tdm->ops->ifunction /* TSComputeI2Function() then calls it as F(t,U,U'') */, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "TSHHT3 integrates second-order systems F(t,U,U',U'') = 0: call TSSetI2Function() (and TSSetI2Jacobian()); this TS has none%s",
              tdm->ops->rhsfunction ? ", but a first-order one U' = G(t,U) of TSSetRHSFunction(): give it as U' - G(t,U) = 0 of first-order states, or take another -ts_type" : "");
   PetscCheck(ts->vec_dot, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_WRONGSTATE,
              "TSHHT3 needs initial velocities: call TS2SetSolution() with both vectors%s",
              tdm->ops->i2function ? "" : ". It integrates second-order systems F(t,U,U',U'') = 0 of TSSetI2Function(), and this TS has TSSetIFunction() alone: is its system of first order?");
   PetscCheck(ts->vec_sol != ts->vec_dot, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_IDN, "TS2SetSolution() was given one vector for both the solution and its time derivative: give two (VecDuplicate())");
-  for (Vec x : {ts->vec_sol, ts->vec_dot}) { /* its entries are not in one array */
+  for (Vec x : {ts->vec_sol, ts->vec_dot}) { /* the entries of a VECNEST are not in one array */
     PetscBool nest;
     PetscCall(PetscObjectTypeCompare((PetscObject)x, VECNEST, &nest));
     PetscCheck(!nest, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
@@ -130,7 +130,7 @@ PetscErrorCode TSSetUp_HHT(TS ts)
   PetscCall(AllocateForRoles(ts));
   PetscCall(SetUpSolvers(ts));
   I.auto_h = (PetscBool)(ts->time_step == unset_step);
-  if (!I.auto_h) I.h_given = ts->time_step; /* before TSSolve() cuts it */
+  if (!I.auto_h) I.h_given = ts->time_step; /* before TSSolve() shortens it to the end of the run */
   if (I.constraints() && I.p.rho == 1)
     PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "hhtdae: alpha = 0 has no numerical damping and is weakly unstable on index-3 systems; "
                                                             "with constraints use alpha < 0 (-ts_hhtdae_alpha -0.05 is enough)\n"));
@@ -160,7 +160,7 @@ PetscErrorCode TSReset_HHT(TS ts)
   for (int r = 0; r < TSHHT3_NUM_ROLES; r++)
     if (!I.is_set || (r == TSHHT3_COORDINATE && I.made_coordinates)) PetscCall(ISDestroy(&I.is[r]));
   I.made_coordinates = PETSC_FALSE;
-  if (I.h_chosen && ts->time_step == I.h_next) ts->time_step = unset_step; /* it is chosen again, unless the user has set one since */
+  if (I.h_chosen && ts->time_step == I.h_next) ts->time_step = unset_step; /* chosen again, unless the user has set h since */
   ForStates(I, [](auto &state) { state = {}; });
   I.p               = I.hht;
   I.linear.chosen   = PETSC_FALSE;
@@ -193,7 +193,7 @@ PetscErrorCode MethodOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   Integrator &I = Get(ts);
   TSHHT3Form  form = I.form;
   TSHHT3Start start = I.start_policy;
-  PetscReal   alpha = I.alpha, rho = I.radius, c = I.corrector.c, reuse[4] = {I.corrector.ratio, I.corrector.slow_rate, I.corrector.hold}; /* and one too many */
+  PetscReal   alpha = I.alpha, rho = I.radius, c = I.corrector.c, reuse[4] = {I.corrector.ratio, I.corrector.slow_rate, I.corrector.hold}; /* 4: to detect a number too many */
   PetscInt    degree = I.predictor.fixed ? I.predictor.degree_max : -1, numbers = 4, order = I.order.wanted;
   const char *const orders[] = {"2", "3", "4", "5", "auto"};
   PetscBool   flg;
@@ -242,7 +242,9 @@ PetscErrorCode OutputOptions(TS ts, HHT3OptionItems PetscOptionsObject)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Between two runs: options find the SNES as they do before the first one, and the next step takes it as another one. A factor that exists would not let them name another package. */
+/* For TSSetFromOptions() after a run: takes the hooks out of the SNES, so that options act on it as before the first
+   run; the next step treats it as a new SNES. Factors are destroyed, since PETSc cannot change the package of an
+   existing factor. */
 PetscErrorCode LetOptionsIn(TS ts)
 {
   Integrator &I = Get(ts);
@@ -277,13 +279,14 @@ PetscErrorCode TSSetFromOptions_HHT(TS ts, HHT3OptionItems PetscOptionsObject)
   if (Get(ts).hooks.snes) PetscCall(LetOptionsIn(ts));
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(SNESGetJacobian(snes, &J, &P, NULL, NULL));
-  if (J && P) PetscCall(KSPSetOperators(ksp, J, P)); /* as SNESSetFromOptions() will; of one triangle there is no LU */
+  if (J && P) PetscCall(KSPSetOperators(ksp, J, P)); /* as SNESSetFromOptions() will; SolverDefaults() reads the type of P: MATSBAIJ has no LU */
   PetscCall(SolverDefaults(ts, ksp));
   PetscCall(HooksLineSearch(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TSSolve(ts, NULL) hands its null vector on, and would give it to the monitors next */
+/* U is null if TSSolve(ts, NULL) interpolates at the final time; TSSolve() would pass the null vector to the monitors
+   next */
 PetscErrorCode TSInterpolate_HHT(TS ts, PetscReal t, Vec U)
 {
   PetscFunctionBegin;
@@ -341,7 +344,7 @@ PetscErrorCode TSView_HHT(TS ts, PetscViewer viewer)
 
 } // namespace
 
-/* When PETSc ends; a program may start it again */
+/* Called by PetscFinalize(); the program may call PetscInitialize() again */
 static PetscErrorCode Finalize(void)
 {
   PetscFunctionBegin;
@@ -375,50 +378,67 @@ static PetscErrorCode Finalize(void)
   Level: beginner
 
   Notes:
-  The error test, `TSSetTolerances()`, judges positions (and first-order states) only: weight_i = max(atol_i, rtol_i Y_i) with
-  Y_i the largest |q_i| so far. The Newton matrix is factored by a direct solver chosen by the work it takes. Where half of the unknowns or more are
-  those of nodes of finite elements (`TSHHT3SetNodes()`) and the factor would have more than 1e7 entries, a Krylov method with the preconditioner hhtconstraint
-  takes its place, as it does where there is no room for a factor. All options of `SNES`, `KSP` and `PC` override the defaults. A correction that fails cuts the
-  step; it does not end the run.
+  The error test, `TSSetTolerances()`, judges positions (and first-order states) only: weight_i = max(atol_i,
+  rtol_i Y_i) with Y_i the largest |q_i| so far. The Newton matrix is factored by a direct solver chosen by the work it
+  takes. Where half of the unknowns or more are those of nodes of finite elements (`TSHHT3SetNodes()`) and the factor
+  would have more than 1e7 entries, a Krylov method with the preconditioner hhtconstraint takes its place, as it does
+  where there is no room for a factor. All options of `SNES`, `KSP` and `PC` override the defaults. A correction that
+  fails reduces h; it does not end the run.
 
-  The corrector stops by its measured rate of convergence, so that -snes_rtol, -snes_atol, -snes_stol, -snes_max_funcs and
-  -snes_divergence_tolerance (`SNESSetTolerances()`) have no meaning, which is printed if they are set; -snes_convergence_test
-  <default,skip> or `SNESSetConvergenceTest()` puts the user's test in its place, and then they do. It makes full steps without a
-  line search: -snes_linesearch_<damping,...> want a -snes_linesearch_type. -snes_max_it, the most iterations of a correction, counts always, and is 10
-  without it (two more each time that corrections have turned back and met); the program's number of 50, `SNESConvergedDefault()` and a lag of 1 cannot be told
-  from PETSc's defaults and want the option.
-  A linear solve ends by -ksp_rtol alone: -ksp_atol has no effect, which is printed, and zero, or less than can be the solution, for a residual that is not zero is a failed solve.
-  -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the application's residual. The default type of `TSAdapt`, also called hhtdae,
-  is basic but for small gains of h, which it does not take since they cost a matrix, growth after failures, which it slows, and growth where nothing moves, where it
-  waits for loads and motions that set in later. A step size
-  chosen by another type is taken as it is; TSADAPTGLEE and types of `SNES` for variational inequalities, adjoints
-  or without a test of convergence are refused. What is put into the `SNES` goes with `TSReset()`, `TSDestroy()` and a change of type.
-  Types of `KSP` and `PC` and a package of factors that were chosen because nobody had set any go with a change of type.
+  The corrector stops by its measured rate of convergence. -snes_rtol, -snes_atol, -snes_stol, -snes_max_funcs and
+  -snes_divergence_tolerance (`SNESSetTolerances()`) therefore have no effect, and a message says so if they are set;
+  they take effect if -snes_convergence_test <default,skip> or `SNESSetConvergenceTest()` replaces the corrector's test
+  by the user's. The corrector makes full steps without a line search: -snes_linesearch_<damping,...> need a
+  -snes_linesearch_type. -snes_max_it, the largest number of iterations of a correction, always takes effect; its
+  default is 10, and two more for each successful bisection between corrections of opposite direction. If the program
+  sets PETSc's default values, 50 iterations, `SNESConvergedDefault()` or a lag of 1, they cannot be told from values
+  that nobody has set; set these by option.
 
-  Where the function of an event begins a step at its zero, as behind the event, the step ends before it comes back to it: `TSEvent` does not see a zero that lies within its tolerance from the one before. So a ball
-  that bounces lower than the tolerance falls through the floor unless the function called at the event lays it to rest.
+  A linear solve ends by -ksp_rtol alone: -ksp_atol has no effect, and a
+  message says so if it is set. A solve counts as failed, too, if its result for a nonzero residual is zero, or shorter
+  than any solution can be.
 
-  Forces that jump where the integrator cannot see it, between two calls of `TSSolve()` or in a monitor, want `TSRestartStep()`; its history is that of the forces before.
-  Behind an event a run starts afresh, whatever its handler has changed.
+  -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the
+  application's residual.
+
+  The default type of `TSAdapt`, also called hhtdae, differs from basic in the growth of h: a
+  small growth is not taken, since it costs a new matrix; growth after failures is slow; and growth while nothing moves
+  is limited if loads and motions set in later. A step size chosen by another type is taken as it is. TSADAPTGLEE and
+  types of `SNES` for variational inequalities, adjoints or without a test of convergence are refused. `TSReset()`,
+  `TSDestroy()` and a change of type take out of the `SNES` what the integrator has put into it. A change of type also
+  unsets the types of `KSP` and `PC` and the factorization package that were chosen by default.
+
+  If the function of an event is zero at the beginning of a step, as it is after the event, the step ends before the
+  function returns to zero: `TSEvent` does not detect a zero that lies within its tolerance of the previous one. A ball
+  that bounces lower than the tolerance therefore falls through the floor, unless the handler of the event brings it to
+  rest.
+
+  Call `TSRestartStep()` if forces jump where the integrator cannot detect it, between two calls of `TSSolve()` or in a
+  monitor: the integrator's history belongs to the forces before the jump. After an event the integrator restarts in any
+  case.
 
   If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's
-  default, counts as set if it comes after `TSSetType()`; before it, it cannot be told from none.
+  default, counts as set only if it is called after `TSSetType()`; an earlier call cannot be told from none.
 
   The Newton matrix is scaled by rows and columns, and so is an operator (Amat) beside it, also a `MATSHELL`, which the integrator assembles for that
   purpose: its product is that of the Jacobian as `TSSetI2Jacobian()` defines it. The matrix beside it (Pmat) has to give its rows (`MatGetRow()`): `MATAIJ`,
   `MATBAIJ`, `MATSBAIJ`, on one rank `MATDENSE`.
 
-  Constraints of positions depend on coordinates and time alone, those of velocities also on first-order states, and on variables and force
-  states V - v(...) = 0 of positions, states and time. Others are refused at the set-up: consistent accelerations need their derivatives.
+  Holonomic constraints may depend on coordinates and time only. Constraints at velocity level may also depend on
+  first-order states, and on variables and force states defined by V - v(...) = 0 with a v of positions, states and
+  time. The set-up refuses constraints with other dependences, since consistent accelerations need the derivatives of
+  the constraints.
 
   With -ts_exact_final_time interpolate `TSSolve()` gives positions at the final time, but leaves velocities where the last step ended, as for all types of
   second order; `TSHHT3Interpolate()` gives both.
 
-  A start looks ahead for loads and motions that set in later: it evaluates the I2Function at times up to `TSGetMaxTime()`, in the state of the start. A function that
-  is defined for shorter, as a table, is to be given a value there, or NaN, but is not to return an error.
+  A start looks for loads and motions that set in later: it evaluates the I2Function in its initial state at times up to
+  `TSGetMaxTime()`. A function that is defined for a shorter time, such as a table, has to return a value or NaN there,
+  not an error.
 
-  Where strong damping holds what moves at the start, within less than a tenth of the first step, the run starts with the velocities that
-  this leaves; -info says so, and the vector of velocities (`TS2GetSolution()`) holds them.
+  If strong damping decelerates the initial velocities within less than a tenth of the first step, the run starts with
+  the velocities that remain after this transient; -info says so, and the vector of velocities (`TS2GetSolution()`)
+  holds them.
 
   References:
 + * - D. Negrut, R. Rampalli, G. Ottarsson, A. Sajdak, J. Comput. Nonlinear Dyn. 2(1), 2007
@@ -446,7 +466,7 @@ PetscErrorCode TSCreate_HHT(TS ts)
   ts->usessnes            = PETSC_TRUE;
   NoteRanks(PetscObjectComm((PetscObject)ts));
   if (ts->time_step == petsc_default_step) ts->time_step = unset_step;
-  Get(ts).failures_unlimited = (PetscBool)(ts->max_snes_failures == 1); /* PETSc's default, which ends the run at the first failure */
+  Get(ts).failures_unlimited = (PetscBool)(ts->max_snes_failures == 1); /* PETSc's default, with which the first failure ends the run */
   if (Get(ts).failures_unlimited) ts->max_snes_failures = HHT3_UNLIMITED;
   PetscCall(ComposeSetters(ts, true));
   PetscFunctionReturn(PETSC_SUCCESS);

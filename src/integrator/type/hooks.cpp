@@ -1,7 +1,8 @@
 /*
-  What the integrator puts into the SNES of its TS, and how it is taken out again: the convergence test, the line search, the lag
-  of the Jacobian, the check of its domain error and the function that fills a matrix made from differences. All of it points to
-  this TS. It goes with TSReset(), TSDestroy() and a change of type, and what the user had set there before comes back.
+  What the integrator puts into the SNES of its TS, and how it is taken out again: the convergence test, the line
+  search, the lag of the Jacobian, the check of its domain error and the function that fills a matrix made from
+  differences. All of these point to this TS. TSReset(), TSDestroy() and a change of type remove them and restore what
+  the user had set before.
 */
 #include "integrator/step/corrector.h"
 #include "settings.h"
@@ -12,11 +13,12 @@ namespace hht3
 namespace
 {
 
-/* The test stands in the SNES of ts, put there by HooksInstall(): neither by the user since nor for another TS */
+/* Whether the convergence test of the SNES is the one that HooksInstall() has set for this TS */
 bool TestIsOurs(TS ts, SNES snes) { return snes->ops->converged == SNESConverged_HHT && snes->cnvP == (void *)ts; }
 
-/* Unless the user has chosen one, by the option, also where it names the default, or by the program. By exchange of the fields: SNESSetConvergenceTest() would destroy the
-   context of the user's test */
+/* Installs the integrator's convergence test, unless the user has chosen one in the program or by the option, even if
+   the option names the default. The fields of the SNES are exchanged, since SNESSetConvergenceTest() would destroy the
+   context of the test before. */
 PetscErrorCode InstallTest(TS ts, SNES snes)
 {
   Hooks    &H = Get(ts).hooks;
@@ -45,11 +47,11 @@ PetscErrorCode RemoveTest(TS ts, SNES snes)
     snes->ops->converged        = SNESConvergedDefault;
     snes->ops->convergeddestroy = H.convergeddestroy;
     snes->cnvP                  = H.cnvP;
-  } else if (H.convergeddestroy) PetscCall((*H.convergeddestroy)(H.cnvP)); /* the user has another test since */
+  } else if (H.convergeddestroy) PetscCall((*H.convergeddestroy)(H.cnvP)); /* the user has set another test since */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Functions of the user's that look at a correction before or after it is made are called by PETSc's line searches, not by a shell */
+/* *checks: the user has set a pre-check or a post-check. PETSc's line searches call them, SNESLINESEARCHSHELL does not. */
 PetscErrorCode ChecksCorrections(SNESLineSearch ls, PetscBool *checks)
 {
   void *ctx;
@@ -65,7 +67,8 @@ PetscErrorCode ChecksCorrections(SNESLineSearch ls, PetscBool *checks)
 
 const char left_behind[] = "hhtdae: backtracking in place of no choice";
 
-/* A line search cannot be made typeless again: backtracking is what SNESSetType() would have chosen, marked as nobody's choice */
+/* The type of a line search cannot be unset: sets backtracking, as SNESSetType() would have done, and marks that the
+   user has not chosen it */
 PetscErrorCode LeaveBacktracking(SNESLineSearch ls)
 {
   PetscContainer mark;
@@ -78,8 +81,9 @@ PetscErrorCode LeaveBacktracking(SNESLineSearch ls)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a type has been chosen: not so where backtracking is still what has been left behind, or a shell has no function yet, which a TS that has read its options has put into a SNES
-   that it shares with its clone (Hooks.CloneBeforeTheFirstSolve) */
+/* Whether the user has chosen a type, which is not so for backtracking that LeaveBacktracking() has set, whose mark is
+   removed here, and for a shell without a function: a TS that has read its options has set it in a SNES that it shares
+   with its clone (Hooks.CloneBeforeTheFirstSolve) */
 PetscErrorCode LineSearchChosen(SNESLineSearch ls, PetscBool *chosen)
 {
   PetscObject mark;
@@ -111,7 +115,7 @@ PetscErrorCode RemoveLineSearch(TS ts, SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The absolute tolerance that Factor() has taken out, unless the user has set another one since */
+/* Restores the absolute tolerance of the KSP, which Factor() has set to 0, unless the user has set another one since */
 PetscErrorCode RestoreTolerance(TS ts, SNES snes)
 {
   Hooks    &H = Get(ts).hooks;
@@ -150,7 +154,7 @@ PetscErrorCode RemoveJacobian(TS ts)
     if (ts->snes) PetscCall(SNESGetJacobian(ts->snes, NULL, &P, NULL, NULL));
     if (P) PetscCall(PetscObjectGetId((PetscObject)P, &id));
     if (ts->snes && H.J && id == H.matrices[1]) PetscCall(SNESSetJacobian(ts->snes, H.J, H.P, NULL, NULL)); /* unless the user has given others since */
-    if (ts->snes && !sdm->ops->computejacobian) { /* SNESSetUp() makes matrices, and chooses who fills them, where there are none (Hooks.AnotherTypeWithoutAJacobian) */
+    if (ts->snes && !sdm->ops->computejacobian) { /* SNESSetUp() then chooses anew who fills which matrices (Hooks.AnotherTypeWithoutAJacobian) */
       if (!H.J && id == H.matrices[1]) {
         PetscCall(MatDestroy(&ts->snes->jacobian));
         PetscCall(MatDestroy(&ts->snes->jacobian_pre));
@@ -165,8 +169,9 @@ PetscErrorCode RemoveJacobian(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A SNES that has served another TS evaluates that one's functions. One of the program's own around ours would not be called in starts and proofs; what another solver on
-   the DM has left there comes without a vector for its values. */
+/* Sets the functions of this TS in the SNES, which may have those of another TS that used it before. A function that
+   the program has set in the SNES is an error, since starts and proofs would not call it. A function that another
+   solver on the same DM has set is replaced: the SNES then has no vec_func. */
 PetscErrorCode TakeSNESFunctions(TS ts, SNES snes)
 {
   DM     dm;
@@ -177,7 +182,7 @@ PetscErrorCode TakeSNESFunctions(TS ts, SNES snes)
   PetscCall(DMGetDMSNES(dm, &sdm));
   PetscCheck(!sdm->ops->computefunction || sdm->ops->computefunction == SNESTSFormFunction || !snes->vec_func || snes->setupcalled, PetscObjectComm((PetscObject)ts), PETSC_ERR_SUP,
              "The SNES of the TS has a function of the program's own (SNESSetFunction()), which TSHHT3 cannot call: starts evaluate the I2Function of TSSetI2Function() alone, where what that function adds belongs. If it is that of another SNES on the DM of the TS, give both a DM of their own (DMClone())");
-  const bool jacobian = sdm->ops->computejacobian == SNESTSFormJacobian; /* asked before SNESSetFunction(), which frees what the DM has shared with another one */
+  const bool jacobian = sdm->ops->computejacobian == SNESTSFormJacobian; /* before SNESSetFunction(), which may replace the DMSNES that the DM shares with another DM */
   PetscCall(SNESSetFunction(snes, NULL, SNESTSFormFunction, ts));
   if (jacobian) PetscCall(DMSNESSetJacobian(dm, SNESTSFormJacobian, ts));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -227,7 +232,8 @@ PetscErrorCode HooksJacobian(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of several TS a SNES serves the one that steps. Before its matrices and its line search are looked at: those of the other one's choice are nobody's. */
+/* A SNES shared by several TS serves the one that steps. Its matrices and line search are examined after this call,
+   since those that another TS has chosen do not count as the user's. */
 PetscErrorCode HooksTakeOver(TS ts, SNES snes)
 {
   PetscFunctionBegin;
@@ -235,7 +241,6 @@ PetscErrorCode HooksTakeOver(TS ts, SNES snes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At set-up */
 PetscErrorCode HooksInstall(TS ts)
 {
   Integrator &I = Get(ts);
@@ -253,7 +258,7 @@ PetscErrorCode HooksInstall(TS ts)
     H.lag          = snes->lagjacobian;
     H.check_domain = snes->checkjacdomainerror;
     PetscCall(OptionGiven((PetscObject)snes, "-snes_lag_jacobian", &I.corrector.user_lag));
-    if (snes->lagjacobian != 1) I.corrector.user_lag = PETSC_TRUE; /* or the program asked for it */
+    if (snes->lagjacobian != 1) I.corrector.user_lag = PETSC_TRUE; /* the program has set a lag */
     if (!I.corrector.user_lag) PetscCall(SNESSetLagJacobian(snes, -2));
   }
   DM dm;
@@ -261,7 +266,7 @@ PetscErrorCode HooksInstall(TS ts)
   PetscCall(DMSNESGetJacobian(dm, &H.dm_jacobian, &H.dm_jacobian_ctx));
   if (!TestIsOurs(ts, snes)) PetscCall(InstallTest(ts, snes));
   PetscCall(OptionGiven((PetscObject)snes, "-snes_check_jacobian_domain_error", &given));
-  if (!given) PetscCall(SNESSetCheckJacobianDomainError(snes, PETSC_TRUE)); /* FormJacobian() says so of a singular matrix */
+  if (!given) PetscCall(SNESSetCheckJacobianDomainError(snes, PETSC_TRUE)); /* by this FormJacobian() reports a singular matrix */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -278,7 +283,8 @@ PetscErrorCode ForgetTheirs(Hooks &H)
 
 } // namespace
 
-/* SNES asks the DM for its functions: where two solvers have one DM, those that were set last serve both (Hooks.TwoSolversOnOneDM) */
+/* SNES takes its functions from its DM: if two solvers share one DM, both would call those that were set last
+   (Hooks.TwoSolversOnOneDM) */
 PetscErrorCode HooksBorrowDM(TS ts)
 {
   Hooks                                &H = Get(ts).hooks;
@@ -288,7 +294,7 @@ PetscErrorCode HooksBorrowDM(TS ts)
   decltype(_DMSNESOps::computefunction) f;
 
   PetscFunctionBegin;
-  if (ts->snes != H.snes) PetscFunctionReturn(PETSC_SUCCESS); /* functions of ours are put into another one */
+  if (ts->snes != H.snes) PetscFunctionReturn(PETSC_SUCCESS); /* HooksInstall() will set the functions in the new SNES */
   PetscCall(SNESGetDM(ts->snes, &dm));
   PetscCall(DMSNESGetFunction(dm, &f, &ctx));
   PetscCall(DMGetDMSNES(dm, &sdm));
@@ -300,7 +306,7 @@ PetscErrorCode HooksBorrowDM(TS ts)
                           "%s: steps do not call the function that another SNES on the DM of the TS, or the program in its SNES, has set (SNESSetFunction()): give every solver a DM of its own (DMClone()), and all forces in TSSetI2Function().\n", TSHHT3));
     H.borrowed_told = PETSC_TRUE;
   }
-  PetscCall(ForgetTheirs(H)); /* of a step that has ended in an error */
+  PetscCall(ForgetTheirs(H)); /* left by a step that has ended in an error */
   PetscCall(DMGetDMSNESWrite(dm, &sdm));
   H.borrowed       = PETSC_TRUE;
   H.their_function = sdm->ops->computefunction;
@@ -323,7 +329,7 @@ PetscErrorCode HooksReturnDM(TS ts)
   if (!H.borrowed && !H.jacobian) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetDM(ts->snes, &dm));
   PetscCall(DMGetDMSNESWrite(dm, &sdm));
-  if (!H.borrowed) { /* another solver on the DM that has no Jacobian would ask ours for its own */
+  if (!H.borrowed) { /* else another solver on the DM that has no Jacobian would call this one between steps */
     if (sdm->ops->computejacobian == SNESTSFormJacobian) PetscCall(SetDMJacobian(sdm, H.computejacobian, H.jacobianctx));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -344,7 +350,7 @@ PetscErrorCode HooksRemove(TS ts)
   PetscFunctionBegin;
   PetscCall(RemoveJacobian(ts));
   PetscCall(ForgetTheirs(H));
-  if (H.line_search && !H.snes && ts->snes) PetscCall(RemoveLineSearch(ts, ts->snes)); /* options were read, nothing set up */
+  if (H.line_search && !H.snes && ts->snes) PetscCall(RemoveLineSearch(ts, ts->snes)); /* options were read, but TSSetUp() was not called */
   if (!H.snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(RemoveTest(ts, H.snes));
   PetscCall(RemoveLineSearch(ts, H.snes));

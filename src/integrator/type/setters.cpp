@@ -1,5 +1,5 @@
 /*
-  What the setters and getters of api.cpp do to a TS of our type, and the list of functions by which they find it.
+  The implementations of the setters and getters of api.cpp, and ComposeSetters(), which composes them with the TS.
 */
 #include "integrator/coordinates/change.h"
 #include "integrator/checkpoint/checkpoint.h"
@@ -102,7 +102,7 @@ PetscErrorCode SetPredictorDegree(TS ts, PetscInt degree)
   PetscCheck(degree >= -1 && degree <= default_degree, PetscObjectComm((PetscObject)ts), PETSC_ERR_ARG_OUTOFRANGE, "Predictor degree %" PetscInt_FMT " is not in -1..%" PetscInt_FMT, degree, default_degree);
   if (fixed != p.fixed || (fixed && most != p.degree_max)) PetscCall(NotAfterSetUp(ts, "The degree of the predictor"));
   p.fixed = fixed;
-  if (fixed || !ts->setupcalled) p.degree_max = most; /* SetUpOrder() has raised one that is free */
+  if (fixed || !ts->setupcalled) p.degree_max = most; /* after the set-up a degree that is not fixed has the limit of SetUpOrder() */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,6 +1,6 @@
 /*
-  What the user has set in TS, TSAdapt and SNES: refused where it makes no sense, reported where it has no meaning here, and taken
-  otherwise.
+  The user's settings of TS, TSAdapt and SNES: invalid ones are errors, and those without effect on this integrator are
+  reported.
 */
 #include "integrator/entries.h"
 #include "settings.h"
@@ -11,9 +11,9 @@ namespace hht3
 namespace
 {
 
-bool IsTolerance(PetscReal x) { return x >= 0 && !PetscIsInfReal(x); } /* NaN is not */
+bool IsTolerance(PetscReal x) { return x >= 0 && !PetscIsInfReal(x); } /* false for NaN */
 
-/* The first entry that is no tolerance, of a vector where the user gave one */
+/* Error unless x, or every entry of v if the user has given a vector, is a finite number >= 0 */
 PetscErrorCode CheckTolerance(TS ts, const char name[], PetscReal x, Vec v)
 {
   PetscInt first;
@@ -39,7 +39,8 @@ PetscErrorCode CheckTolerance(TS ts, const char name[], PetscReal x, Vec v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TSADAPTGLEE scales an error that TSGLEE alone computes: without it every step would pass, ten times as long as the last */
+/* TSADAPTGLEE uses an error estimate that only TSGLEE computes; without one it would accept every step and multiply h
+   by ten */
 PetscErrorCode CheckAdapt(TS ts)
 {
   const TSAdapt a = ts->adapt;
@@ -56,7 +57,7 @@ PetscErrorCode CheckAdapt(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Types of SNES that solve something else than F(X) = 0 with the matrix of X */
+/* Refuses types of SNES that do not solve F(X) = 0 with the Newton matrix of X */
 PetscErrorCode CheckSNESType(TS ts)
 {
   static constexpr char bounds[] = "solves variational inequalities: the unknowns of a step are accelerations, on which there are no bounds";
@@ -78,7 +79,8 @@ PetscErrorCode CheckSNESType(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Coarse matrices of the application would lack the scaling of (10), and PETSc would restrict the SNES' solution to their levels before there is one */
+/* Refuses coarse matrices of the application: they would lack the scaling of (10), and to compute them PETSc would
+   restrict the solution of the SNES to the coarse levels before there is a solution */
 PetscErrorCode CheckMultigrid(TS ts)
 {
   KSP              ksp;
@@ -99,8 +101,9 @@ PetscErrorCode CheckMultigrid(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Linear solves that go on from what others have left: of tolerances that follow norms of residuals, which the corrector does not take, the start would have the last one; and a matrix
-   that a solve has scaled is not the one with which corrections are proved */
+/* Refuses options by which a linear solve depends on earlier solves, or changes the matrix. The corrector does not
+   compute the norms of residuals that -snes_ksp_ew needs, and a start would use the tolerance of the last solve. After
+   -ksp_diagonal_scale the matrix would no longer be the one by which corrections are proved. */
 PetscErrorCode CheckSolves(TS ts)
 {
   KSP       ksp;
@@ -117,17 +120,17 @@ PetscErrorCode CheckSolves(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc's own number of iterations, which tells whether the user has set one */
+/* PETSc's default of -snes_max_it: the user has set any other value */
 constexpr PetscInt petsc_max_it = 50;
 
-/* Options that only SNES' own test or its own line searches read */
+/* Options that only the tests or the line searches of SNES read */
 struct Unread {
   const char *name, *reader, *instead;
 };
 
 constexpr char test[] = "the test of SNES", line_search[] = "SNES' own line searches";
-constexpr char use_test[]        = "-snes_convergence_test default lets it rule; the corrector's own test is set by -ts_hhtdae_corrector_tolerance";
-constexpr char use_line_search[] = "-snes_linesearch_type basic, bt, l2 or cp lets one rule; the corrector makes full steps";
+constexpr char use_test[]        = "-snes_convergence_test default enables it; the corrector's own test is set by -ts_hhtdae_corrector_tolerance";
+constexpr char use_line_search[] = "-snes_linesearch_type basic, bt, l2 or cp enables one; the corrector makes full steps";
 
 constexpr Unread unread[] = {
   {"-snes_rtol",                        test,        use_test       },
@@ -167,13 +170,13 @@ PetscErrorCode ReportUnread(TS ts, bool own_test, bool own_line_search)
     if (given) PetscCall(ReportUnreadOption(ts, u.name, u));
     reported = reported || (given && u.reader == test);
   }
-  /* by the program */
-  PetscBool newton; /* other types set tolerances themselves */
+  /* tolerances that the program has set */
+  PetscBool newton; /* other types of SNES change their tolerances themselves */
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESNEWTONLS, &newton));
   const bool set = newton && (snes->rtol != (PetscReal)1e-8 || snes->abstol != (PetscReal)1e-50 || snes->stol != (PetscReal)1e-8);
   if (own_test && set && !reported) PetscCall(ReportUnreadOption(ts, "SNESSetTolerances()", unread[0]));
   if (ts->adapt->ignore_max > 0)
-    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "%s: -ts_adapt_max_ignore %g has no effect, as the error test takes each coordinate by the largest value that it has had; what is not to count has a tolerance of its own, TSSetTolerances() with vectors\n", TSHHT3, (double)ts->adapt->ignore_max));
+    PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "%s: -ts_adapt_max_ignore %g has no effect, as the error test scales each coordinate by its largest value so far; to exclude unknowns from the test give them large tolerances, TSSetTolerances() with vectors\n", TSHHT3, (double)ts->adapt->ignore_max));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,5 @@
-/* What the user has set: tolerances and options that have a meaning here or none (settings.cpp), and the public setters and getters (setters.cpp); what the
-   integrator puts into the SNES, and takes out again with what stood there before (hooks.cpp). */
+/* The user's settings: checks of tolerances and of PETSc's options (settings.cpp), the public setters and getters
+   (setters.cpp); and what the integrator puts into the SNES and removes again (hooks.cpp). */
 #ifndef HHTDAE_SETTINGS_H
 #define HHTDAE_SETTINGS_H
 
@@ -8,35 +8,39 @@
 namespace hht3
 {
 
-/* At set-up, and at a start: whatever may change between two runs */
+/* Checks tolerances, times and TSAdapt: at set-up, and at each start, since they may change between two runs */
 PetscErrorCode CheckSettings(TS ts);
 
-/* Of the SNES, after HooksInstall() */
+/* Checks the settings of the SNES and takes -snes_max_it; after HooksInstall() */
 PetscErrorCode TakeSNESSettings(TS ts);
 PetscErrorCode OptionGiven(PetscObject object, const char name[], PetscBool *given);
 
-/* The list of functions by which the public ones find a TS of our type, made or taken back */
+/* Composes the functions that the public setters and getters call with the TS; attach = false removes them */
 PetscErrorCode ComposeSetters(TS ts, bool attach);
 
-/* An error in a setter that comes too late */
+/* Error if the TS has been set up; `what` is the name of the setting in the message */
 PetscErrorCode NotAfterSetUp(TS ts, const char *what);
 
-/* Our line search, where the user chose none, nor a type of SNES that has its own: a correction then costs no residual after the last one */
+/* Chooses the integrator's line search, which evaluates no residual after the last correction, unless the user has
+   chosen a line search or a type of SNES other than newtonls */
 PetscErrorCode HooksLineSearch(TS ts);
 
-/* Our differences fill the matrix */
+/* Makes the integrator's finite differences fill the matrix */
 PetscErrorCode HooksJacobian(TS ts);
 
-/* At set-up: the convergence test, and that SNES asks for a matrix and reports a singular one as the corrector wants it */
+/* At set-up: removes the hooks of another TS from a SNES that both share */
 PetscErrorCode HooksTakeOver(TS ts, SNES snes);
+/* At set-up: the convergence test, the lag of the Jacobian and the check of its domain error, which reports a singular
+   matrix */
 PetscErrorCode HooksInstall(TS ts);
 PetscErrorCode HooksRemove(TS ts);
 
-/* The functions of this TS in the DM of its SNES for a step, where another solver on it has put its own, and those back at the end */
+/* At the beginning and at the end of a step: sets the functions of this TS in the DM of its SNES if another solver has
+   replaced them, and restores those of the other solver */
 PetscErrorCode HooksBorrowDM(TS ts);
 PetscErrorCode HooksReturnDM(TS ts);
 
-/* Whether the test of the SNES is the user's, who may have set it at any time */
+/* Whether the convergence test of the SNES is the user's, who may set one at any time */
 PetscBool HooksUserTest(TS ts);
 
 } // namespace hht3

@@ -1,6 +1,7 @@
 /*
-  Options of ours that nobody has read, reported when PETSc ends, since until then an object may come that reads them: a name that was
-  misspelt, with the nearest one that exists, or an option of an object that was never asked to read its options.
+  Reports options of this library that no object has read: misspelt names, with the nearest existing name, and options
+  of an object whose SetFromOptions() was never called. PetscFinalize() reports them, since an object created until then
+  may still read them.
 */
 #include "unused.h"
 #include <algorithm>
@@ -29,9 +30,9 @@ const char *const names[] = {"ts_hhtdae_",
                              "ts_hhtdae_resume",
                              nullptr};
 
-std::vector<const char *const *> families = {names}; /* lists of names, each ended by NULL; the first entry is the beginning that they share */
+std::vector<const char *const *> families = {names}; /* lists of names, each ended by NULL; the first entry is the common beginning of the others */
 
-/* Where the name of an option begins behind the prefix of its object; npos if it is of another family */
+/* Position in `option` behind the prefix of the object, at which `stem` begins; npos if the option is of another family */
 size_t StemBegin(const std::string &option, const std::string &stem)
 {
   size_t at = option.find(stem);
@@ -39,7 +40,7 @@ size_t StemBegin(const std::string &option, const std::string &stem)
   return at;
 }
 
-/* Letters to insert, delete or replace to make b of a */
+/* Number of letters to insert, delete or replace in order to turn a into b */
 size_t EditDistance(const std::string &a, const std::string &b)
 {
   std::vector<size_t> row(b.size() + 1);
@@ -56,7 +57,7 @@ size_t EditDistance(const std::string &a, const std::string &b)
   return row[b.size()];
 }
 
-/* What to say of an unused option; nothing if it is none of ours */
+/* The warning about an unused option; empty if the option does not belong to this library */
 std::string Remark(const std::string &option)
 {
   for (const char *const *family : families) {
@@ -78,7 +79,7 @@ std::string Remark(const std::string &option)
   return "";
 }
 
-/* Ours among the options that the first rank has not used */
+/* unused, on rank 0: the options of this library that rank 0 has not used */
 PetscErrorCode UnusedOnFirstRank(PetscMPIInt rank, std::vector<std::string> &unused)
 {
   PetscInt n = 0;
@@ -93,7 +94,7 @@ PetscErrorCode UnusedOnFirstRank(PetscMPIInt rank, std::vector<std::string> &unu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An object on other ranks may have used what the first has not */
+/* *used: an object on any rank has used the option */
 PetscErrorCode UsedAnywhere(const std::string &option, PetscBool *used)
 {
   char        name[256] = "";
@@ -119,7 +120,8 @@ void NoteRanks(MPI_Comm comm)
   if (!MPI_Comm_size(comm, &here) && !MPI_Comm_size(PETSC_COMM_WORLD, &all)) on_all_ranks = on_all_ranks || here == all;
 }
 
-/* Collective, and so only where every rank has loaded the library, as is known by a TS of theirs or by the plugin: others would be waited for for ever */
+/* Collective on PETSC_COMM_WORLD. The report is therefore made only if all ranks are known to use the library, through
+   a TS on all ranks or the plugin loader; otherwise it would wait forever. */
 PetscErrorCode ReportUnusedOptions(void)
 {
   std::vector<std::string> unused;
@@ -165,7 +167,7 @@ PetscErrorCode ForgetOptions(void)
   Level: developer
 
   Notes:
-  A list is taken once. An option with the prefix of an object belongs to the names behind the prefix.
+  A list that has been declared before is ignored. Prefixes of objects in front of the names are allowed.
 
 .seealso: `TSHHT3`, `TSHHT3Initialize()`, `PetscOptionsLeft()`
 @*/

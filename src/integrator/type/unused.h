@@ -1,4 +1,4 @@
-/* Options that were set and never read, unused.cpp. */
+/* Options that were set and that no object has read, unused.cpp. */
 #ifndef HHTDAE_UNUSED_H
 #define HHTDAE_UNUSED_H
 
@@ -9,10 +9,10 @@
 namespace hht3
 {
 
-/* Prints them; collective on PETSC_COMM_WORLD, called when PETSc ends */
+/* Prints them; collective on PETSC_COMM_WORLD, called by PetscFinalize() */
 PetscErrorCode ReportUnusedOptions(void);
-void           NoteRanks(MPI_Comm comm); /* the library is at work on all ranks of this one */
-PetscErrorCode ForgetOptions(void); /* but our own */
+void           NoteRanks(MPI_Comm comm); /* all ranks of comm use the library */
+PetscErrorCode ForgetOptions(void); /* forgets the lists of TSHHT3DeclareOptions() */
 
 } // namespace hht3
 

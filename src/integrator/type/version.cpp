@@ -1,4 +1,4 @@
-/* The PETSc that the library was built for, and the one that runs */
+/* Checks that the running PETSc is the one that the library was built for */
 #include "integrator/compat.h"
 
 static const char instruction[] = "build hhtdae with the PETSc of this program, make -f makefile.petsc build PETSC_DIR=... PETSC_ARCH=...";
@@ -6,9 +6,10 @@ static const char instruction[] = "build hhtdae with the PETSc of this program, 
 static const char *Flavour(PetscInt release) { return release ? "" : " (development)"; }
 
 /*
-  Layouts and numbers of PETSc's objects change with every minor version, and between a release and the development after it: a
-  plugin built for another one would write beside them. Only functions that are the same from 3.18 on are called here. PETSc
-  writes numbers of its own width, which need not be ours and is asked for first.
+  The layout of PETSc's objects and the values of its enumerations change with every minor version, and between a
+  release and the development after it: a library built for another version would corrupt memory. This function calls
+  only functions that are the same from 3.18 on. The width of PetscInt is checked first, since the PETSc functions
+  called next write integers of PETSc's own width.
 */
 PetscErrorCode HHT3CheckPetscVersion(void)
 {
