@@ -1,12 +1,13 @@
 /*
-  Checkpoints: all that the next step depends on, so that a run that is resumed repeats the uninterrupted one bit for bit, and writing
-  changes nothing in the run that writes.
+  A checkpoint holds everything that the next step depends on, so that a resumed run repeats the uninterrupted one bit
+  for bit. Writing it changes nothing in the run that writes.
 
-  The plain structs of state.h, the vectors, the Newton matrix with its values (the application need not be asked for it again in the state,
-  the coordinates and the memory that it was made in), and what its solver has taken over from the matrices before it, LinearSaveState().
-  It is written between two steps, when everybody has seen the last one and events have had their say, at the beginning of the next.
+  Its contents are the plain structs of state.h, the vectors, the values of the Newton matrix, and the state that its
+  solver has kept from earlier matrices (LinearSaveState()). The values are saved because the application could not
+  evaluate the matrix again: the state, the coordinates and the memory with which it was made are gone. A checkpoint is
+  written at the beginning of a step, after monitors and event handlers of the last one.
 
-  Whether a file belongs to the run: checkpoint_identity.cpp.
+  checkpoint_identity.cpp checks whether a file belongs to the run.
 */
 #include "integrator/coordinates/change.h"
 #include "checkpoint.h"
@@ -29,7 +30,7 @@ void TransferNumbers(TS ts, Archive &a)
 
   for (PetscInt *x : {&ts->steps, &ts->reject, &ts->snes_its, &ts->ksp_its, &ts->num_snes_failures, &ts->adapt->timestepjustdecreased, &snes->lagjacobian, &snes->jac_iter, &snes->pre_iter})
     a.plain(*x);
-  if (a.reading && (Get(ts).corrector.user_lag || snes->lagjacobian > 0)) snes->lagjacobian = lag; /* the user's, of this run or of the other one */
+  if (a.reading && (Get(ts).corrector.user_lag || snes->lagjacobian > 0)) snes->lagjacobian = lag; /* this run's, if the user has set one in either run */
   for (PetscReal *x : {&ts->ptime, &ts->ptime_prev, &ts->ptime_prev_rollback, &ts->time_step}) a.plain(*x);
   a.plain(ts->steprestart);
 }
@@ -51,12 +52,13 @@ PetscErrorCode TransferVec(TS ts, Archive &a, Vec *x)
   PetscFunctionBegin;
   if (!*x) PetscCall(VecDuplicate(ts->vec_sol, x));
   PetscCall(VecGetLocalSize(*x, &n));
-  PetscCall(a.reading ? VecGetArray(*x, &array) : VecGetArrayRead(*x, (const PetscScalar **)&array)); /* nobody is to believe that a vector has changed which goes to a file */
+  PetscCall(a.reading ? VecGetArray(*x, &array) : VecGetArrayRead(*x, (const PetscScalar **)&array)); /* writing keeps its PetscObjectState */
   a.array(array, (size_t)n);
   PetscCall(a.reading ? VecRestoreArray(*x, &array) : VecRestoreArrayRead(*x, (const PetscScalar **)&array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A vector that may be null: then it is null in the run that reads, too */
 PetscErrorCode TransferIfThere(TS ts, Archive &a, Vec *x)
 {
   PetscBool there = (PetscBool)(*x != NULL);
@@ -68,7 +70,7 @@ PetscErrorCode TransferIfThere(TS ts, Archive &a, Vec *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last step's two ends, the history, and what else there is at the time */
+/* Both ends of the last step, the history, and the vectors that not every problem or every step has */
 PetscErrorCode TransferVectors(TS ts, Archive &a)
 {
   Integrator        &I   = Get(ts);
@@ -84,7 +86,7 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What this rank has to say */
+/* This rank's part of the file */
 PetscErrorCode GatherRun(TS ts, Archive &a)
 {
   Identity          id;
@@ -108,7 +110,7 @@ PetscErrorCode GatherRun(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What has been read so far had the sizes that it has here */
+/* Error unless everything read so far has, on all ranks, the size that this run expects */
 PetscErrorCode CheckBuild(TS ts, const char file[], const Archive &a)
 {
   bool good;
@@ -141,10 +143,10 @@ PetscErrorCode RestoreRun(TS ts, const char file[], Archive &a)
   PetscCall(TransferVec(ts, a, &of_file));
   PetscCall(CheckBuild(ts, file, a));
   I.stage_id = 0;
-  PetscCall(CommitChange(ts)); /* before anything evaluates the state in its coordinates */
+  PetscCall(CommitChange(ts)); /* the application takes over its coordinates, before anything is evaluated in them */
   PetscCall(OptionsInWords(ts, &options));
   const std::string theirs(words.begin(), words.end());
-  if (theirs != options) /* the user's right, but then the run is another one */
+  if (theirs != options) /* allowed, but the run will not repeat the steps of the other one */
     PetscCall(PetscPrintf(PetscObjectComm((PetscObject)ts), "hhtdae: the run that wrote %s had other options, and this one will not repeat its steps:\n  there %s\n  here  %s\n", file, theirs.c_str(), options.c_str()));
   PetscCall(TellingResidual(ts, is));
   PetscCall(CheckTellingResidual(ts, file, was, is));
@@ -207,7 +209,8 @@ PetscErrorCode SetCheckpointVec(TS ts, Vec extra)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At the beginning of a step. While an event is being located the last step may yet be taken back: then after it. */
+/* At the beginning of a step. While an event is being located, TSEvent may roll the last step back, so that no
+   checkpoint is written until it is located. */
 PetscErrorCode CheckpointIfDue(TS ts)
 {
   Integrator    &I     = Get(ts);
@@ -228,8 +231,8 @@ PetscErrorCode CheckCheckpointFile(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After the last step there is no other one: TSSolve() calls its monitors then with the reason set. A file without a number of steps is
-   written here alone. */
+/* Writes the checkpoint due after the last step, which no beginning of another step writes: TSSolve() then calls its
+   monitors with ts->reason set. Without -ts_hhtdae_checkpoint_every this is the only checkpoint of the run. */
 PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
 {
   PetscFunctionBegin;
@@ -249,7 +252,7 @@ PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
 
   Input Parameters:
 + ts   - the `TS` context, after at least one step
-- file - name of the file; written beside and renamed when complete
+- file - name of the file; it is written as file.part and renamed when it is complete
 
   Options Database Keys:
 + -ts_hhtdae_checkpoint <file>    - write checkpoints to the file, whose directory has to exist when the run begins
@@ -258,13 +261,14 @@ PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal, Vec, void *)
   Level: intermediate
 
   Note:
-  Writing changes nothing in the run that writes, and one that resumes repeats it bit for bit: the Newton matrix and what its solver has
-  taken over from earlier ones are part of the file. Where that cannot be had the matrix is made anew in the run that resumes, which
-  then agrees to the accuracy of the tolerance, and -info says so: matrices that give no rows (shell, nest), and preconditioners that
-  keep something of which nothing is known. These are all but `hhtconstraint` and the direct solvers that are chosen by default, also where they are
-  the solvers within `hhtconstraint`; "mumpsnd" on several ranks repeats a run to rounding only, also without a checkpoint. Adaptors with a memory of
-  their own (dsp) start anew. The file carries a checksum. After an error within a step, of a callback for one, the state that the
-  step began with is written.
+  Writing changes nothing in the run that writes, and a resumed run repeats it bit for bit: the Newton matrix, and the
+  state that its solver has kept from earlier matrices, are part of the file. There are two exceptions, for which the
+  resumed run makes a new matrix, agrees with the uninterrupted one to the accuracy of the tolerance only, and says so
+  by -info: matrices without `MatGetRow()` (shell, nest), and preconditioners whose state cannot be saved. The latter
+  are all but `hhtconstraint` and the direct solvers chosen by default, also as the solvers within `hhtconstraint`.
+  "mumpsnd" on several ranks repeats a run to rounding only, even without a checkpoint. Types of `TSAdapt` with a memory
+  (dsp) start without it. The file has a checksum. After an error within a step, for example in a callback, the state at
+  the beginning of the step is written.
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCheckpointVec()`
 @*/
@@ -277,7 +281,7 @@ PetscErrorCode TSHHT3CheckpointSave(TS ts, const char file[])
 }
 
 /*@C
-  TSHHT3CheckpointLoad - Goes on from a file written by `TSHHT3CheckpointSave()`
+  TSHHT3CheckpointLoad - Resumes a run from a file written by `TSHHT3CheckpointSave()`
 
   Collective
 
@@ -291,10 +295,11 @@ PetscErrorCode TSHHT3CheckpointSave(TS ts, const char file[])
   Level: intermediate
 
   Note:
-  Call it before `TSSolve()`; the state, time, step and counters then take the place of the initial ones, before `TSSetUp()` not yet: the set-up reads the file,
-  until then `TSGetTime()` and `TS2GetSolution()` give what was there before. Queries of scenes set up. A file of another
-  problem, method, version or number of ranks is refused. Other tolerances and other options of the solvers are taken, and reported.
-  Points of `TSSetTimeSpan()` behind the checkpoint are not gone back for: `TSGetTimeSpanSolutions()` gives vectors of NaN there.
+  Call it before `TSSolve()`. The state, time, step and counters of the file replace the initial ones. If the TS has not
+  been set up, `TSSetUp()` reads the file; until then `TSGetTime()` and `TS2GetSolution()` give the values from before.
+  Queries of scenes set the TS up. A file of another problem, method, version or number of ranks is an error. Other
+  tolerances and other options of the solvers are allowed, and reported. For points of `TSSetTimeSpan()` earlier than
+  the checkpoint `TSGetTimeSpanSolutions()` gives vectors of NaN.
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointSave()`
 @*/
@@ -307,7 +312,7 @@ PetscErrorCode TSHHT3CheckpointLoad(TS ts, const char file[])
 }
 
 /*@
-  TSHHT3SetCheckpointVec - Gives checkpoints a vector of the application's to save and restore with the state
+  TSHHT3SetCheckpointVec - Sets a vector of the application that checkpoints save and restore with the state
 
   Collective
 
@@ -318,13 +323,15 @@ PetscErrorCode TSHHT3CheckpointLoad(TS ts, const char file[])
   Level: advanced
 
   Notes:
-  It is meant for what the application's residual depends on besides the state, such as the reference frames that
-  `TSHHT3SetCoordinateChange()` changes. A file is written with the values that the vector has then, and `TSHHT3CheckpointLoad()`
-  overwrites them; then it calls commit of `TSHHT3SetCoordinateChange()`, if there is one, for the application to take them over. A
-  file whose vector has another size, or that has one where the run has none or the other way round, is refused.
+  The vector is meant for data on which the application's residual depends besides the state, such as the reference
+  frames that `TSHHT3SetCoordinateChange()` changes. A checkpoint saves the values that the vector has when it is
+  written. `TSHHT3CheckpointLoad()` overwrites the vector and then calls the commit function of
+  `TSHHT3SetCoordinateChange()`, if there is one, in which the application takes the values over. If the vector in the
+  file has another size, or only one of the file and the run has a vector, the file is an error.
 
-  An application that has to do something before a file is written, to bring the vector up to date or to write what it has recorded so far,
-  composes a function of `ts` with it: PetscObjectComposeFunction((PetscObject)ts, "TSHHT3CheckpointPrepare_C", function).
+  If the application has to update the vector, or to write what it has recorded so far, before a checkpoint is written,
+  it composes a function of `ts`, which is then called: PetscObjectComposeFunction((PetscObject)ts,
+  "TSHHT3CheckpointPrepare_C", function).
 
 .seealso: `TSHHT3`, `TSHHT3CheckpointSave()`, `TSHHT3CheckpointLoad()`, `TSHHT3SetCoordinateChange()`
 @*/

@@ -1,4 +1,4 @@
-/* Checkpoints of a run, checkpoint.cpp: what may be asked of them. */
+/* Checkpoints of a run: writing, reading and when they are due, checkpoint.cpp. */
 #ifndef HHTDAE_CHECKPOINT_H
 #define HHTDAE_CHECKPOINT_H
 
@@ -10,14 +10,14 @@ namespace hht3
 PetscErrorCode SetCheckpointVec(TS ts, Vec extra);
 PetscErrorCode CheckpointSave(TS ts, const char file[]);
 
-/* Before the set-up it is only noted, and read at its end */
+/* Before TSSetUp() only the name of the file is kept; TSSetUp() reads it at its end */
 PetscErrorCode CheckpointLoad(TS ts, const char file[]);
-/* A file that has been noted only is read now, by the set-up: for queries between CheckpointLoad() and the first step */
+/* Calls TSSetUp() if a file has still to be read: for queries between CheckpointLoad() and the first step */
 PetscErrorCode ReadCheckpoint(TS ts);
 
-/* At the beginning of a step; the monitor does it after the last one */
-PetscErrorCode CheckCheckpointFile(TS ts); /* before the run: whether it can be written */
-PetscErrorCode CheckpointIfDue(TS ts);
+PetscErrorCode CheckCheckpointFile(TS ts); /* at set-up: error if the file of -ts_hhtdae_checkpoint cannot be written */
+PetscErrorCode CheckpointIfDue(TS ts);     /* at the beginning of each step */
+/* Writes the checkpoint after the last step */
 PetscErrorCode MonitorCheckpoint(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx);
 
 } // namespace hht3

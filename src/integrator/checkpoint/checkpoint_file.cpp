@@ -14,7 +14,8 @@ namespace hht3
 namespace
 {
 
-/* In the byte order of the machine: a file from one of the other order has another magic number. Of the checksum's byte order, too. */
+/* Header and checksum are in the byte order of the machine. On a machine of the other byte order the checksum does not
+   match, so that the file is refused. */
 struct Header {
   char         magic[8];
   std::int32_t version, ranks;
@@ -26,9 +27,10 @@ constexpr std::int32_t version  = 16;
 /* Files of versions 1 to 3 began with this number and their version, big-endian */
 constexpr unsigned char old_magic[4] = {0x00, 0x12, 0x7b, 0xaa};
 
-constexpr size_t message = 1 << 26; /* bytes from rank to rank at once: MPI counts in int */
+constexpr size_t message = 1 << 26; /* largest number of bytes in one message, as MPI counts in int */
 
-/* Rank 0's file. Once something has failed nothing more is done, but ranks go on talking to one another. */
+/* The file, which rank 0 opens. After an error its functions do nothing, so that the messages between the ranks still
+   match. */
 struct Stream {
   std::FILE *f = nullptr;
   Hash       sum;
@@ -51,7 +53,7 @@ struct Stream {
     if (std::fread(x, 1, n, f) != n) error = EIO;
     else sum.add(x, n);
   }
-  /* With everything on the disk */
+  /* Closes the file when all its bytes are on the disk */
   void finish()
   {
     if (f && !error && (std::fflush(f) || fsync(fileno(f)))) error = errno;
@@ -66,12 +68,12 @@ std::string Directory(const std::string &file)
   return slash == std::string::npos ? "." : slash ? file.substr(0, slash) : "/";
 }
 
-/* A rename is on the disk when the directory is */
+/* Makes a rename permanent: it is on the disk only when its directory is */
 void SyncDirectory(const std::string &file)
 {
   const std::string dir = Directory(file);
   const int         d   = open(dir.c_str(), O_RDONLY | O_DIRECTORY);
-  if (d < 0) return; /* not every file system lets itself be asked */
+  if (d < 0) return; /* some file systems do not open directories */
   (void)fsync(d);
   close(d);
 }
@@ -124,10 +126,10 @@ PetscErrorCode ReadAll(MPI_Comm comm, const std::vector<std::uint64_t> &sizes, s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What rank 0 has found out about a file before anybody gets anything from it */
+/* Rank 0's verdict on a file, before its contents are distributed */
 enum Verdict : int { Fine, Unreadable, Foreign, Old, Ranks };
 
-/* The header and the sizes of the ranks' parts. A file whose checksum is right is taken at its word. */
+/* Reads the header and the sizes of the ranks' parts. Header and sizes are trusted only if the checksum is right. */
 Verdict Examine(const char *name, PetscMPIInt ranks, Header &h, std::vector<std::uint64_t> &sizes)
 {
   Stream            in;
@@ -183,7 +185,7 @@ PetscErrorCode CheckpointFileWrite(MPI_Comm comm, const std::string &file, const
     std::memcpy(h.magic, magic, sizeof magic);
     h.version = version;
     h.ranks   = (std::int32_t)sizes.size();
-    if (!stat(file.c_str(), &info) && !S_ISREG(info.st_mode)) out.error = EINVAL; /* a device or directory is not to be replaced */
+    if (!stat(file.c_str(), &info) && !S_ISREG(info.st_mode)) out.error = EINVAL; /* the rename would replace a device */
     else out.open(part.c_str(), "wb");
     out.write(&h, sizeof h);
     out.write(sizes.data(), sizes.size() * sizeof(sizes[0]));

@@ -1,6 +1,6 @@
 /*
-  To tell whether a file belongs to the run: sizes, roles and method, and the residual at the state in the file, with other accelerations than
-  its own, at which it would be zero.
+  Checks whether a file belongs to the run. It compares sizes, roles and method, and the residual at the state in the
+  file with accelerations other than those of the state, at which the residual would be zero for any problem.
 */
 #include "checkpoint_parts.h"
 #include "integrator/step/corrector.h"
@@ -16,8 +16,8 @@ namespace hht3
 namespace
 {
 
-/* Residuals at the state in the file that differ by more than this part of the largest row's belong to another problem: rounding of
-   another machine is far below it. */
+/* Difference of two residuals at the state in the file, relative to the largest entry, above which they belong to
+   different problems; rounding on another machine is far smaller. */
 constexpr PetscReal residual_mismatch = 1e-11;
 
 } // namespace

@@ -1,6 +1,8 @@
 /*
-  The Newton matrix in a checkpoint, and that of samples between steps: the values of the rows, and what the solver keeps. It is not evaluated again, because the application
-  may have gone on since: it may have taken other coordinates, or remember more. Only its pattern has to be there, and that takes an evaluation.
+  The Newton matrix in a checkpoint, and the matrix of samples between steps: the values of their rows and the state of
+  their solvers. The values are saved because the application cannot evaluate the matrix again: its coordinates and its
+  memory may have changed since the matrix was made. The matrix is evaluated after a resume only in order to create its
+  pattern.
 */
 #include "checkpoint_parts.h"
 #include "integrator/entries.h"
@@ -18,8 +20,8 @@ namespace
 {
 
 struct MatrixState {
-  PetscBool there  = PETSC_FALSE; /* its values are in the file */
-  PetscBool chosen = PETSC_FALSE; /* a linear solver was */
+  PetscBool there  = PETSC_FALSE; /* the values of the matrix are in the file */
+  PetscBool chosen = PETSC_FALSE; /* a linear solver had been chosen */
 };
 
 std::uint64_t PatternHash(const std::vector<PetscInt> &col, const std::vector<PetscInt> &offset)
@@ -40,7 +42,7 @@ PetscErrorCode SaveRows(Mat A, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The matrix takes the values if it has the pattern that they belong to, on all ranks */
+/* *good: the pattern of A is the saved one on all ranks, and A has the saved values */
 PetscErrorCode LoadRows(TS ts, Mat A, Archive &a, bool *good)
 {
   std::vector<PetscScalar> values, now;
@@ -56,7 +58,7 @@ PetscErrorCode LoadRows(TS ts, Mat A, Archive &a, bool *good)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solver of the matrix as it was; *same = PETSC_FALSE if it may have other bits */
+/* Restores the solver of the matrix; *same = PETSC_FALSE if its solves may differ bitwise */
 PetscErrorCode LoadSolver(KSP ksp, Mat J, Mat P, LinearState *linear, const MatrixState &m, Archive &a, PetscBool *same, bool *good)
 {
   PetscBool usable;
@@ -71,7 +73,7 @@ PetscErrorCode LoadSolver(KSP ksp, Mat J, Mat P, LinearState *linear, const Matr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same on all ranks; nothing where the file ends before it */
+/* Gives the same on all ranks; an empty state if the file ends before it */
 PetscErrorCode ReadMatrixState(TS ts, Archive &a, MatrixState *m)
 {
   bool good;
@@ -97,7 +99,7 @@ PetscErrorCode SaveSampler(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where it cannot be had, the next sample makes it anew */
+/* If the sampler cannot be restored, the next sample makes a new one */
 PetscErrorCode LoadSampler(TS ts, Archive &a)
 {
   Integrator            &I     = Get(ts);
@@ -145,7 +147,8 @@ PetscErrorCode SaveNewton(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* TSSetUp() lets the SNES call the Jacobian of the TS when its type is set up; without, SNESSetUp() takes differences of its own function (Checkpoint.JacobianOfADM) */
+/* TSSetUp() sets the Jacobian of the TS in the SNES only after the set-up of its type, which calls this function;
+   without it SNESSetUp() would choose finite differences (Checkpoint.JacobianOfADM) */
 PetscErrorCode SetUpSNES(TS ts)
 {
   DM     dm;
@@ -183,9 +186,9 @@ PetscErrorCode LoadNewton(TS ts, Archive &a)
     I.stat = saved;
     PetscCall(LoadRows(ts, P, a, &good));
     if (good && J != P && rows) PetscCall(LoadRows(ts, J, a, &good));
-    good = good && (rows || mffd); /* the application's product has no values to restore */
+    good = good && (rows || mffd); /* an operator of the application without rows has no values to restore */
     if (good) PetscCall(PetscObjectStateGet((PetscObject)P, &I.linear.scaled));
-    if (good) PetscCall(PetscObjectStateGet((PetscObject)J, &I.scaled_operator)); /* as they were saved */
+    if (good) PetscCall(PetscObjectStateGet((PetscObject)J, &I.scaled_operator)); /* the values were saved scaled */
     if (good) PetscCall(LoadSolver(ksp, J, P, &I.linear, m, a, &same, &good));
   } else good = false;
   if (!good) I.corrector.matrix.forget();
@@ -198,7 +201,8 @@ PetscErrorCode LoadNewton(TS ts, Archive &a)
 
 } // namespace
 
-/* What is read of a solver may end earlier where the user has chosen another one: the samples' part is apart */
+/* The sampler is saved as a separate list, since less of the Newton matrix's part is read if the user has chosen
+   another solver */
 PetscErrorCode SaveMatrices(TS ts, Archive &a)
 {
   Archive samples;
@@ -218,7 +222,7 @@ PetscErrorCode LoadMatrices(TS ts, Archive &a)
   a.list(samples.data);
   samples.reading = true;
   PetscCall(LoadNewton(ts, a));
-  PetscCall(LoadSampler(ts, samples)); /* whose solver is the one of the run */
+  PetscCall(LoadSampler(ts, samples)); /* after the Newton matrix, since the sampler takes its solver from that of the run */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

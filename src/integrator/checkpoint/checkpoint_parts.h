@@ -1,4 +1,4 @@
-/* What a checkpoint is made of: whether it belongs to the run that reads it (checkpoint_identity.cpp), the matrices and what their solvers keep
+/* Parts of a checkpoint: the identity of the run (checkpoint_identity.cpp), the matrices and the state of their solvers
    (checkpoint_matrix.cpp), and the file (checkpoint_file.cpp). */
 #ifndef HHTDAE_CHECKPOINT_PARTS_H
 #define HHTDAE_CHECKPOINT_PARTS_H
@@ -10,10 +10,10 @@
 namespace hht3
 {
 
-/* What must be the same in both runs, rank by rank */
+/* Must be the same in both runs, on each rank */
 struct Identity {
-  PetscInt      N, n, extra, extra_n; /* unknowns of all ranks and of this one; entries of the application's own likewise */
-  PetscInt      form, order;          /* order: the largest one */
+  PetscInt      N, n, extra, extra_n; /* number of unknowns on all ranks and on this one; of entries of the application's vector likewise */
+  PetscInt      form, order;          /* order: the largest order of the run */
   Parameters    p;
   std::uint64_t roles;
 };
@@ -21,25 +21,29 @@ struct Identity {
 PetscErrorCode IdentifyRun(TS ts, Identity *id);
 PetscErrorCode CheckIdentity(TS ts, const char file[], const Identity &was);
 
-/* Options that the run may change, at the cost of repeating the uninterrupted one no more: for comparison and for the message */
+/* A text with the options that a resumed run may change, although it then does not repeat the uninterrupted one: for
+   comparison and for the message */
 PetscErrorCode OptionsInWords(TS ts, std::string *text);
 
-/* The residual by which a problem is told: at the last state, with accelerations that leave the inertia forces in it */
+/* The residual by which the problem is recognized: at the last state, but with accelerations 2 A + 1, so that inertia
+   forces show in it */
 PetscErrorCode TellingResidual(TS ts, Vec F);
 PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is);
 
-/* Where they cannot be restored the run makes new ones */
+/* Matrices that cannot be restored are made again by the run */
 PetscErrorCode SaveMatrices(TS ts, Archive &a);
 PetscErrorCode LoadMatrices(TS ts, Archive &a);
 
-/* A file with one sequence of bytes of every rank: written beside and renamed when it is whole and on the disk, with a checksum. Collective.
-   A run that dies while writing keeps the file that was there before. */
+/* Writes a file with a checksum and one sequence of bytes from each rank. Collective. The file is written as file.part
+   and renamed when it is complete and on the disk, so that a run that dies while writing leaves the file from before.
+   */
 PetscErrorCode CheckpointFileWrite(MPI_Comm comm, const std::string &file, const std::vector<char> &mine);
 
-/* Collective; an error where no such file could be written: for before a run, lest it tells at its end */
+/* Collective; error if the file could not be written. Called before a run, so that the user does not learn it only at
+   the end. */
 PetscErrorCode CheckpointFileCheck(MPI_Comm comm, const std::string &file);
 
-/* Collective; an error on all ranks where the file is damaged, not one of these, or of another number of ranks */
+/* Collective; error on all ranks if the file is damaged, is no checkpoint, or is from another number of ranks */
 PetscErrorCode CheckpointFileRead(MPI_Comm comm, const std::string &file, std::vector<char> &mine);
 
 } // namespace hht3
