@@ -1,15 +1,20 @@
 /*
-  Analyses that move a run which has not begun: AssembleAt(), Kinematics() and StaticEquilibrium(). Positions that satisfy the constraints and motions of a time t are found by
-  damped Newton iterations on the scene's own matrix, with all velocities and accelerations zero:
+  Analyses that change the state of a run before its first step: AssembleAt(), Kinematics() and StaticEquilibrium().
+  Damped Newton iterations with the scene's Jacobian, with all velocities and accelerations zero, find positions that
+  satisfy the constraints and motions at a time t:
 
     (F_u + r F_u' + s F_u'') d = (0, Phi),   s large: d is the smallest step in the metric of the mass matrix.
 
-  Steps are shortened to largest_turn (still.h). Velocities, accelerations and multipliers are then those of a consistent start from these positions.
+  Steps are shortened to largest_turn (still.h). A consistent start from these positions then gives velocities,
+  accelerations and multipliers.
 
-  Where there are several positions near by, as in a four-bar that can change from one way of assembly to the other, those that the motion leads to are meant. So time is divided
-  (FollowMotions()) into steps of largest_turn at most, whose first Newton iteration is the predictor along the velocities. A step is too long if the inverse of the constraints'
-  derivatives has changed in it by so much that iterations with the old and with the new one differ: if one of their singular values has changed its sign, the step has come to another
-  branch. Where branches do cross, it does so in steps of any length, and the one is taken whose velocities go on.
+  If several positions satisfy the constraints, as of a four-bar linkage with two assembly modes, the one is wanted to
+  which the motion leads continuously. FollowMotions() therefore divides the time into steps of at most largest_turn, in
+  which the first Newton iteration is a prediction along the velocities. A step is too long if the inverse of the
+  constraints' derivatives changes so much within it that Newton iterations with the old and with the new inverse
+  differ: if a singular value has changed its sign, the step has reached another branch. Where branches cross, a
+  singular value changes its sign in steps of any length; StepAcross() then takes the branch on which the velocities
+  continue.
 */
 #include "hhtdae/analyses.h"
 #include "guard.h"
@@ -24,33 +29,41 @@ namespace hhtdae
 namespace
 {
 
-/* s in 1/s^2: 2^40, so that stiffnesses are negligible compared with the masses in the metric of a step; as a power of two it adds no rounding */
+/* s in 1/s^2: 2^40, so that stiffnesses are negligible compared with s times the masses in the metric of a step; a
+   power of two adds no rounding */
 constexpr double mass_shift = 1099511627776.;
 /* r in 1/s: with r = 0 the row of a first-order state whose rate does not depend on the state would be zero and the
    matrix singular. It is not a round number, since the rate constant of a user's state might be equal to a round number
    and cancel it (Analyses.KinematicsBesideIntegrators). */
 constexpr double state_shift       = 0.7310585786300049;
-constexpr int    newton_iterations = 100, max_step_halvings = 6; /* largest numbers: of iterations in an assembly, and of halvings of a step */
+constexpr int    newton_iterations = 100, max_step_halvings = 6; /* largest number of iterations of an assembly, and of halvings of a step */
 /* Limit on iterations beyond newton_iterations, which are allowed in proportion to the length of the first step (Analyses.KinematicsOfWhatIsGearedUp) */
 constexpr double max_extra_iterations = 1e4;
 /* Largest change of an angle that a motion prescribes between two assemblies, rad: well below half a turn, beyond which
    full turns of angles would be lost (CountedAngles.KinematicsOverManyTurns) */
 constexpr double max_motion_angle = 1;
-/* Largest change of the second iteration of a step by the change of the constraints' derivatives within the step, relative: a change of sign of a singular value makes it more than 1 */
+/* Largest relative change of the second iteration of a step that the change of the constraints' derivatives within the
+   step may cause; if a singular value changes its sign it is more than 1 (CompareIterations()) */
 constexpr double largest_change = 0.5;
-/* A step whose predictor is shorter, in units of largest_turn, and which is too long nevertheless, is at a point where branches cross (Analyses.KinematicsThroughChangePoints) */
+/* If a step is too long although its prediction is shorter than this, in units of largest_turn, branches cross there
+   (Analyses.KinematicsThroughChangePoints) */
 constexpr double shortest_step = 1. / 1024;
-/* Shortening of a step at once, so that none is as short as rounding of the time (Analyses.AssemblyOfWhatIsNoNumber) */
+/* Smallest factor by which a step is shortened at once, so that no step is as short as rounding of the time
+   (Analyses.AssemblyOfWhatIsNoNumber) */
 constexpr double most_shortening = 1. / 16;
-/* Steps across such a point, times the one that was too long; largest change of velocities in them, relative to the largest velocity */
+/* Lengths of the steps tried across such a point, in units of the step that was too long; and the largest change of
+   velocities over them, relative to the largest velocity */
 constexpr double steps_across[] = {4, 8, 16}, largest_bend = 0.1;
-/* Newton steps shorter than this, in radians or parts of the scene's size, are rounding and end the iteration */
+/* Newton steps shorter than this, in radians or relative to the scene's size, are rounding and end the iteration */
 constexpr double negligible_step = 1e-13;
-/* Second iterations that say nothing of the constraints' derivatives: rounding of the constraints times the inverse of these near change points */
+/* A second iteration shorter than this is not compared, since near change points it is rounding of the constraints
+   times the inverse of their derivatives */
 constexpr double negligible_bend = 1e-11;
-/* Of the last Newton step of a step that is followed: far less than branches are apart */
+/* Largest last Newton iteration of an accepted step of Follower: far less than the distance between branches */
 constexpr double accurate_step = 1e-9;
-/* Growth of the speed at which a motion has come to its end, as where a linkage locks; over steps that are longer than long_step, in units of largest_turn, which a start from rest does not do */
+/* Growth of the speed, relative to the slowest step so far, at which a motion cannot go on because the linkage locks.
+   Only steps longer than long_step, in units of largest_turn, are compared, since in a start from rest the speed grows by any
+   factor */
 constexpr double locked_speed = 100, long_step = 0.1;
 
 struct AssemblySystem : StillSystem {
@@ -138,14 +151,15 @@ PetscErrorCode WorstRow(AssemblySystem &E, std::string *name)
   PetscFunctionReturn(0);
 }
 
-/* What Newton's iteration has come to */
+/* Result of MeetConstraints() */
 struct Approach {
   double first   = 0;        /* length of the first step, in units of largest_turn */
-  double last    = INFINITY; /* of the last one */
-  bool   regular = true;     /* the step from the positions before it is not too long */
+  double last    = INFINITY; /* length of the last step, likewise */
+  bool   regular = true;     /* the step in time from the positions before is not too long */
 };
 
-/* After the second iteration, with the derivatives at the end of the first one: A is what it would have been with those at its beginning */
+/* Compares the second Newton iteration d, made with the derivatives after the first one, with A, the same iteration
+   with the derivatives before the first one */
 PetscErrorCode CompareIterations(AssemblySystem &E, bool *regular)
 {
   double change, old;
@@ -157,8 +171,9 @@ PetscErrorCode CompareIterations(AssemblySystem &E, bool *regular)
   PetscFunctionReturn(0);
 }
 
-/* Moves E.U to the nearest positions that satisfy the constraints at E.t, as far as Newton's iteration gets; E.V is transformed where the axes of Euler angles change. following: it ends where the
-   step from the positions before is too long. */
+/* Newton's iteration from E.U towards the nearest positions that satisfy the constraints at E.t; Met() tells whether it
+   has reached them. E.V is transformed if the axes of Euler angles change. following: the iteration ends as soon as the
+   step in time from the positions before proves too long. */
 PetscErrorCode MeetConstraints(AssemblySystem &E, bool following, Approach *by)
 {
   bool improved;
@@ -188,15 +203,17 @@ PetscErrorCode MeetConstraints(AssemblySystem &E, bool following, Approach *by)
   PetscFunctionReturn(0);
 }
 
-/* Either the violations are within the tolerance, as lengths and as sines (Analyses.AssemblyThatFallsShort), or the last Newton step is, as in scenes so large that rounding of
-   lengths exceeds the tolerance (Analyses.KinematicsInAnyUnitsOfLength) */
+/* Whether the constraints are satisfied: the violations, lengths or sines, are within the tolerance
+   (Analyses.AssemblyThatFallsShort), or else the last Newton step is, as in scenes so large that rounding of lengths
+   exceeds the tolerance (Analyses.KinematicsInAnyUnitsOfLength) */
 bool Met(const AssemblySystem &E, const Approach &by)
 {
   const double tolerance = E.R.scene.start.tolerance;
   return E.misfit <= tolerance * std::min(1.0, E.size) || by.last * largest_turn <= tolerance;
 }
 
-/* The error that E.t cannot be reached; t: the time that was asked for; where: what is known of how far it can be */
+/* Raises the error that positions at E.t cannot be found; t: the requested time; where: part of the message that says
+   how far the motion leads */
 PetscErrorCode NotAssembled(AssemblySystem &E, double t, const std::string &where)
 {
   std::string worst;
@@ -207,7 +224,7 @@ PetscErrorCode NotAssembled(AssemblySystem &E, double t, const std::string &wher
           E.misfit, worst.c_str());
 }
 
-/* MeetConstraints() in one go */
+/* MeetConstraints() without division into steps; error if the constraints are not satisfied */
 PetscErrorCode MustMeetConstraints(AssemblySystem &E, double t)
 {
   Approach by;
@@ -227,7 +244,7 @@ double TurnOfMotions(const SceneData &s, double from, double to)
   return worst;
 }
 
-/* Positions, velocities, axes and memories of a run, to be restored where an attempt fails */
+/* Keeps positions, velocities, axes and counted angles of a run, to restore them if an attempt fails */
 class KeptPositions
 {
 public:
@@ -253,7 +270,7 @@ public:
     R.queried_angles = queried_;
     for (int k = 0; k < 3; k++) PetscCall(VecCopy(kept_[k], now_[k]));
     PetscCall(UseAxes(R));
-    R.accepted_move = -1; /* the bodies are where the attempt has left them */
+    R.accepted_move = -1; /* the bodies still have the poses of the attempt */
     PetscFunctionReturn(0);
   }
 
@@ -263,7 +280,8 @@ private:
   std::vector<CountedAngle> queried_;
 };
 
-/* v: what the motions move in E.U at E.t within the time dt; infinite where constraints depend on each other */
+/* v: displacement of E.U within the time dt around E.t that the motions prescribe; infinite if the constraints are
+   dependent */
 PetscErrorCode DisplacementAlong(AssemblySystem &E, double dt, Vec v)
 {
   const double t = E.t;
@@ -282,7 +300,8 @@ PetscErrorCode DisplacementAlong(AssemblySystem &E, double dt, Vec v)
   PetscFunctionReturn(0);
 }
 
-/* From `at` across a point where branches of the motion cross, which is not farther than about dt: to positions, not beyond t, whose velocities go on, if there are some */
+/* Steps from the time `at` across a point where branches of the motion cross, which is at most about dt away. *across:
+   positions were found, at t at the latest, at which the velocities are those at `at`, up to largest_bend */
 PetscErrorCode StepAcross(AssemblySystem &E, KeptPositions &before, double at, double t, double dt, bool *across)
 {
   Vec      v[2];
@@ -312,7 +331,8 @@ PetscErrorCode StepAcross(AssemblySystem &E, KeptPositions &before, double at, d
   PetscFunctionReturn(0);
 }
 
-/* The end of an interval of time from `at` to `next` in which no motion turns by more than max_motion_angle: the nearest positions that satisfy a motion determine its angle only up to full turns */
+/* The end of the longest interval from `at` towards `next`, found by halving, in which no motion turns by more than
+   max_motion_angle: positions that satisfy a motion determine its angle only up to full turns */
 double WithoutFullTurns(const SceneData &s, double at, double next)
 {
   for (double middle; TurnOfMotions(s, at, next) > max_motion_angle; next = middle) {
@@ -322,7 +342,7 @@ double WithoutFullTurns(const SceneData &s, double at, double next)
   return next;
 }
 
-/* Follows the motions from the time `at`, where E.U meets the constraints, to t */
+/* Follows the motions from the time E.t, at which E.U satisfies the constraints, to `end` */
 class Follower
 {
 public:
@@ -341,7 +361,7 @@ public:
 private:
   AssemblySystem &E;
   const double    t_;
-  double          at_, step_, slowest_ = INFINITY; /* slowest_: the least mean speed of a long step so far, in units of largest_turn */
+  double          at_, step_, slowest_ = INFINITY; /* slowest_: smallest mean speed of the steps longer than long_step, largest_turn per time */
   KeptPositions   before_;
 
   PetscErrorCode step()
@@ -367,8 +387,9 @@ private:
     PetscFunctionReturn(0);
   }
 
-  /* Over a point where branches cross. Where that fails, no positions lead on if the speed has grown beyond bounds; else derivatives are not those of smooth constraints, and the next positions are
-     those that Newton's iteration finds. */
+  /* Steps across a point where branches cross. If that fails and the speed has grown without bounds, the motion cannot
+     go on, which is an error. If the speed has not, the constraints are not smooth there, and the positions that
+     Newton's iteration finds are taken. */
   PetscErrorCode cross(double speed)
   {
     const double next = E.t;
@@ -390,7 +411,8 @@ private:
   }
 };
 
-/* Follows the motions from `from` to t. Positions that do not meet the constraints before, as where they are not asked to at the start, go to the nearest ones first. */
+/* Follows the motions from `from` to t. Positions that violate the constraints, since the scene was not assembled at
+   the start, are first moved to the nearest ones that satisfy them. */
 PetscErrorCode FollowMotions(Runtime &R, double from, double t, Vec U, Vec V)
 {
   AssemblySystem E(R, from);
@@ -436,7 +458,7 @@ PetscErrorCode AtRest(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
   PetscFunctionReturn(0);
 }
 
-/* Calls move(run, U, V), which takes ts to another state; after an error the state of the run is restored */
+/* Calls move(run, U, V), which changes the state of ts; after an error the state from before is restored */
 template <class Move> PetscErrorCode MoveRun(TS ts, const char *call, const Move &move)
 {
   Runtime  *R;

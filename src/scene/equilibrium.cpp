@@ -23,13 +23,13 @@ namespace hhtdae
 namespace
 {
 
-constexpr int    equilibrium_iterations = 2000;
+constexpr int    equilibrium_iterations = 2000; /* largest number of Newton corrections in all steps */
 /* Unbalanced forces relative to the largest force of the scene, and violations of constraints relative to its size, that count as zero */
 constexpr double force_tolerance = 1e-10;
 /* Largest factor by which h grows from one step to the next: in general, and while the work of the forces decreases (StepGrowth()) */
 constexpr double max_growth            = 8;
 constexpr double max_growth_converging = 2;
-/* Steps shorter than this, in radians or parts of the scene's size, are accepted without further corrections */
+/* Steps shorter than this, in radians or relative to the scene's size, are accepted without further corrections */
 constexpr double negligible_step_length = 1e-9;
 /* Forces below this multiple of the forces caused by rounding of the coordinates count as zero, since no iteration
    reduces them (Equilibrium.AMeshFarFromTheOrigin) */
@@ -219,7 +219,7 @@ PetscErrorCode CorrectRolling(Equilibrium &E, double h)
       PetscCall(VecWAXPY(E.A, at[k] * h, E.V, E.U));
       PetscCall(Residual(E.R, E.t, E.A, E.V, E.zero, E.F));
       PetscCall(VecAXPY(E.residual_at_rest, weight[k], E.F));
-      PetscCall(Residual(E.R, E.t, E.A, E.zero, E.zero, E.F)); /* without the velocities that motions prescribe */
+      PetscCall(Residual(E.R, E.t, E.A, E.zero, E.zero, E.F)); /* the prescribed velocities of motions, which are not to act */
       PetscCall(VecAXPY(E.residual_at_rest, -weight[k], E.F));
     }
     const PetscScalar *v;
@@ -518,7 +518,7 @@ PetscErrorCode WorstRate(const Equilibrium &E, std::string *name)
   PetscFunctionReturn(0);
 }
 
-/* What U violates of equilibrium, for the message where none has been found */
+/* text: which equations of equilibrium U violates, for the message if none was found */
 PetscErrorCode DescribeRest(Equilibrium &E, std::string *text)
 {
   Unbalanced at;

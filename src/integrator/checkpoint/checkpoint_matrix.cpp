@@ -222,7 +222,7 @@ PetscErrorCode LoadMatrices(TS ts, Archive &a)
   a.list(samples.data);
   samples.reading = true;
   PetscCall(LoadNewton(ts, a));
-  PetscCall(LoadSampler(ts, samples)); /* after the Newton matrix, since the sampler takes its solver from that of the run */
+  PetscCall(LoadSampler(ts, samples)); /* last, since GetSampler() depends on the solver of the run */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
