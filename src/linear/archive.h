@@ -41,7 +41,7 @@ public:
     bytes(x.data(), count * sizeof(T));
   }
 
-  /* An array whose length the reader knows, too */
+  /* An array of which the reader expects this length */
   template <class T> void array(T *x, std::size_t count)
   {
     std::uint64_t n = count;

@@ -219,7 +219,7 @@ PetscErrorCode CorrectRolling(Equilibrium &E, double h)
       PetscCall(VecWAXPY(E.A, at[k] * h, E.V, E.U));
       PetscCall(Residual(E.R, E.t, E.A, E.V, E.zero, E.F));
       PetscCall(VecAXPY(E.residual_at_rest, weight[k], E.F));
-      PetscCall(Residual(E.R, E.t, E.A, E.zero, E.zero, E.F)); /* the prescribed velocities of motions, which are not to act */
+      PetscCall(Residual(E.R, E.t, E.A, E.zero, E.zero, E.F)); /* the part that motions prescribe */
       PetscCall(VecAXPY(E.residual_at_rest, -weight[k], E.F));
     }
     const PetscScalar *v;

@@ -34,9 +34,8 @@ PetscErrorCode CheckTellingResidual(TS ts, const char file[], Vec was, Vec is);
 PetscErrorCode SaveMatrices(TS ts, Archive &a);
 PetscErrorCode LoadMatrices(TS ts, Archive &a);
 
-/* Writes a file with a checksum and one sequence of bytes from each rank. Collective. The file is written as file.part
-   and renamed when it is complete and on the disk, so that a run that dies while writing leaves the file from before.
-   */
+/* Collective; writes a file with a checksum and one sequence of bytes from each rank. It is written as file.part and
+   renamed when it is complete and on the disk, so that a run that dies while writing leaves the file from before. */
 PetscErrorCode CheckpointFileWrite(MPI_Comm comm, const std::string &file, const std::vector<char> &mine);
 
 /* Collective; error if the file could not be written. Called before a run, so that the user does not learn it only at

@@ -274,7 +274,7 @@ PetscErrorCode TSSetFromOptions_HHT(TS ts, HHT3OptionItems PetscOptionsObject)
   PetscCall(MethodOptions(ts, PetscOptionsObject));
   PetscCall(OutputOptions(ts, PetscOptionsObject));
   PetscOptionsHeadEnd();
-  /* defaults go in before SNESSetFromOptions(), which TSSetFromOptions() calls next, so that options override them */
+  /* TSSetFromOptions() calls SNESSetFromOptions() next, whose options override these defaults */
   PetscCall(TSGetSNES(ts, &snes));
   if (Get(ts).hooks.snes) PetscCall(LetOptionsIn(ts));
   PetscCall(SNESGetKSP(snes, &ksp));
@@ -394,19 +394,18 @@ static PetscErrorCode Finalize(void)
   sets PETSc's default values, 50 iterations, `SNESConvergedDefault()` or a lag of 1, they cannot be told from values
   that nobody has set; set these by option.
 
-  A linear solve ends by -ksp_rtol alone: -ksp_atol has no effect, and a
-  message says so if it is set. A solve counts as failed, too, if its result for a nonzero residual is zero, or shorter
-  than any solution can be.
+  A linear solve ends by -ksp_rtol alone: -ksp_atol has no effect, and a message says so if it is set. A solve counts as
+  failed, too, if its result for a nonzero residual is zero, or shorter than any solution can be.
 
-  -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the
-  application's residual.
+  -snes_fd, -snes_fd_color and -ts_fd_color make the Jacobian from differences of the application's residual.
 
-  The default type of `TSAdapt`, also called hhtdae, differs from basic in the growth of h: a
-  small growth is not taken, since it costs a new matrix; growth after failures is slow; and growth while nothing moves
-  is limited if loads and motions set in later. A step size chosen by another type is taken as it is. TSADAPTGLEE and
-  types of `SNES` for variational inequalities, adjoints or without a test of convergence are refused. `TSReset()`,
-  `TSDestroy()` and a change of type take out of the `SNES` what the integrator has put into it. A change of type also
-  unsets the types of `KSP` and `PC` and the factorization package that were chosen by default.
+  The default type of `TSAdapt`, also called hhtdae, differs from basic in the growth of h: a small growth is not taken,
+  since it costs a new matrix; growth after failures is slow; and growth while nothing moves is limited if loads and
+  motions set in later. A step size chosen by another type is taken as it is. TSADAPTGLEE and types of `SNES` for
+  variational inequalities, adjoints or without a test of convergence are refused.
+
+  `TSReset()`, `TSDestroy()` and a change of type take out of the `SNES` what the integrator has put into it. A change of
+  type also unsets the types of `KSP` and `PC` and the factorization package that were chosen by default.
 
   If the function of an event is zero at the beginning of a step, as it is after the event, the step ends before the
   function returns to zero: `TSEvent` does not detect a zero that lies within its tolerance of the previous one. A ball
@@ -420,17 +419,18 @@ static PetscErrorCode Finalize(void)
   If no step size is set, the first one is chosen from the third derivative of the positions. TSSetTimeStep(ts, 0.1), PETSc's
   default, counts as set only if it is called after `TSSetType()`; an earlier call cannot be told from none.
 
-  The Newton matrix is scaled by rows and columns, and so is an operator (Amat) beside it, also a `MATSHELL`, which the integrator assembles for that
-  purpose: its product is that of the Jacobian as `TSSetI2Jacobian()` defines it. The matrix beside it (Pmat) has to give its rows (`MatGetRow()`): `MATAIJ`,
-  `MATBAIJ`, `MATSBAIJ`, on one rank `MATDENSE`.
+  The integrator scales the Newton matrix by rows and columns. If `TSSetI2Jacobian()` is given two matrices, both are
+  scaled. Amat may be a `MATSHELL`, whose product is that of the unscaled Jacobian; the integrator assembles it after each
+  evaluation, which removes the former scaling. Pmat has to support `MatGetRow()`: `MATAIJ`, `MATBAIJ`, `MATSBAIJ`, on one
+  rank `MATDENSE`.
 
   Holonomic constraints may depend on coordinates and time only. Constraints at velocity level may also depend on
   first-order states, and on variables and force states defined by V - v(...) = 0 with a v of positions, states and
   time. The set-up refuses constraints with other dependences, since consistent accelerations need the derivatives of
   the constraints.
 
-  With -ts_exact_final_time interpolate `TSSolve()` gives positions at the final time, but leaves velocities where the last step ended, as for all types of
-  second order; `TSHHT3Interpolate()` gives both.
+  With -ts_exact_final_time interpolate `TSSolve()` gives positions at the final time, but velocities at the end of the
+  last step, as all types of second order do; `TSHHT3Interpolate()` gives both.
 
   A start looks for loads and motions that set in later: it evaluates the I2Function in its initial state at times up to
   `TSGetMaxTime()`. A function that is defined for a shorter time, such as a table, has to return a value or NaN there,

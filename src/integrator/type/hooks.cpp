@@ -81,9 +81,9 @@ PetscErrorCode LeaveBacktracking(SNESLineSearch ls)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the user has chosen a type, which is not so for backtracking that LeaveBacktracking() has set, whose mark is
-   removed here, and for a shell without a function: a TS that has read its options has set it in a SNES that it shares
-   with its clone (Hooks.CloneBeforeTheFirstSolve) */
+/* *chosen: the user has chosen a type. Two types do not count: backtracking with the mark of LeaveBacktracking(), which
+   is removed here; and a shell without a function, which a TS that has read its options has set in a SNES that it
+   shares with its clone (Hooks.CloneBeforeTheFirstSolve). */
 PetscErrorCode LineSearchChosen(SNESLineSearch ls, PetscBool *chosen)
 {
   PetscObject mark;
@@ -329,7 +329,7 @@ PetscErrorCode HooksReturnDM(TS ts)
   if (!H.borrowed && !H.jacobian) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetDM(ts->snes, &dm));
   PetscCall(DMGetDMSNESWrite(dm, &sdm));
-  if (!H.borrowed) { /* else another solver on the DM that has no Jacobian would call this one between steps */
+  if (!H.borrowed) { /* between steps another solver on the DM that has no Jacobian must not find this one */
     if (sdm->ops->computejacobian == SNESTSFormJacobian) PetscCall(SetDMJacobian(sdm, H.computejacobian, H.jacobianctx));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
