@@ -79,7 +79,7 @@ public:
 
   /* Does not limit the step, but warns once if the body has rotated too far for small displacements (FullBody.TurnsTooFarForSmallDisplacements) */
   bool   limitsSteps() const override { return monitorsRotation(); }
-  double longestStep(const Evaluation &ev) const override
+  double longestStep(const Evaluation &ev, const Horizon &) const override
   {
     Vector3 moment = Vector3::Zero();
     if (warned_) return std::numeric_limits<double>::infinity();

@@ -4,6 +4,7 @@
 #define HHTDAE_SCENE_BATCH_H
 
 #include "bodies.h"
+#include "look_ahead.h"
 #include "pattern.h"
 #include <algorithm>
 #include <array>
@@ -52,11 +53,11 @@ public:
   virtual void accept(Bodies &) {}
   /* potential energy of the instances that belong to this rank, at the present state of the bodies */
   virtual double energy(const Evaluation &) const { return 0; }
-  /* longestStep(): upper bound on the next step, s, at the present velocities and accelerations, so that no contact is
-     tunnelled through and no counted angle turns by more than half a turn. limitsSteps(): whether instances have such a
-     bound */
+  /* longestStep(): upper bound on the next step, s, which would otherwise go to the horizon, at the present velocities and accelerations,
+     so that no contact is passed over and no counted angle turns by more than half a turn. limitsSteps(): whether instances
+     have such a bound */
   virtual bool   limitsSteps() const { return false; }
-  virtual double longestStep(const Evaluation &) const { return std::numeric_limits<double>::infinity(); }
+  virtual double longestStep(const Evaluation &, const Horizon &) const { return std::numeric_limits<double>::infinity(); }
   /* adds the energy and momentum of own coordinates of extensions (extension.h), which belong to no body of the scene */
   virtual void addTo(Balance &, const Evaluation &) const {}
   /* memory of accepted steps, for checkpoints. memory(): number of values; copyMemory(): copies them from the array (in) or to it */
@@ -124,13 +125,46 @@ template <class K, class Instance> double LongestStep(const Instance &e, const E
   return K::longestStep(e.data, f, w, acceleration, angular);
 }
 
-template <class K, class Instances> double LongestSteps(const Instances &all, const Evaluation &ev)
+/* A kernel with contacts, whose gaps are foreseen (look_ahead.h), has
+     static double    gap(const Data &, const Frame<double> *f);
+     static GapBounds gapBounds(const Data &, const MarkerForecast *m, double horizon);
+     static double    deepest(const Data &);   largest penetration at the end of a step that begins without contact */
+template <class K, class = void> struct HasGap : std::false_type {
+};
+template <class K>
+struct HasGap<K, std::void_t<decltype(K::gap(std::declval<const typename K::Data &>(), (const Frame<double> *)nullptr))>> : std::true_type {
+};
+
+template <class K, class Instance> double BeforeContact(const Instance &e, const Evaluation &ev, const Horizon &horizon)
+{
+  const Bodies  &B = ev.bodies;
+  MarkerForecast m[2];
+  for (int k = 0; k < 2; k++) {
+    const PetscInt    b = B.marker[e.marker[k]].body;
+    const BodyMotion &x = B.now[b];
+    const Frame<double> f = B.frame<true>(e.marker[k]);
+    m[k] = {f, f.x - x.r, x.r, x.v, B.acceleration(b, ev.v, ev.a), x.w, B.angularAcceleration(b, ev.v, ev.a)};
+  }
+  const auto gap = [&](double t) {
+    const Frame<double> f[2] = {m[0].at(t), m[1].at(t)};
+    return K::gap(e.data, f);
+  };
+  return LongestBeforeContact(gap, K::gapBounds(e.data, m, horizon.time), K::deepest(e.data), horizon);
+}
+
+template <class K, class Instances> double LongestSteps(const Instances &all, const Evaluation &ev, const Horizon &horizon)
 {
   double least = std::numeric_limits<double>::infinity();
-  if constexpr (HasLongestStep<K>::value)
-    for (const auto &e : all) least = std::min(least, LongestStep<K>(e, ev));
+  for (const auto &e : all) {
+    if constexpr (HasLongestStep<K>::value) least = std::min(least, LongestStep<K>(e, ev));
+    if constexpr (HasGap<K>::value) {
+      const double most = std::min(least, horizon.time), before = BeforeContact<K>(e, ev, {most, horizon.negligible});
+      if (before < most) least = before;
+    }
+  }
   (void)all;
   (void)ev;
+  (void)horizon;
   return least;
 }
 

@@ -95,7 +95,7 @@ public:
   }
 
   bool     limitsSteps() const override { return HasLongestStep<K>::value && !all.empty(); }
-  double   longestStep(const Evaluation &ev) const override { return LongestSteps<K>(all, ev); }
+  double   longestStep(const Evaluation &ev, const Horizon &horizon) const override { return LongestSteps<K>(all, ev, horizon); }
   bool     isDescribed() const override { return K::memory > 0; }
   PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
   bool     memoryOf(const StoreBase *s, PetscInt number, double *x) const override

@@ -55,8 +55,8 @@ public:
     (void)ev;
     return sum;
   }
-  bool   limitsSteps() const override { return HasLongestStep<K>::value && !all.empty(); }
-  double longestStep(const Evaluation &ev) const override { return LongestSteps<K>(all, ev); }
+  bool   limitsSteps() const override { return (HasLongestStep<K>::value || HasGap<K>::value) && !all.empty(); }
+  double longestStep(const Evaluation &ev, const Horizon &horizon) const override { return LongestSteps<K>(all, ev, horizon); }
   bool     isDescribed() const override { return K::memory > 0; }
   PetscInt memory() const override { return K::memory * (PetscInt)all.size(); }
   bool     memoryOf(const StoreBase *s, PetscInt number, double *x) const override

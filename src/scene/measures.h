@@ -123,7 +123,7 @@ public:
     read([&](const LocalMeasure &m) { any = any || m.kind == Measure::Angle; });
     return any;
   }
-  double longestStep(const Evaluation &e) const override
+  double longestStep(const Evaluation &e, const Horizon &) const override
   {
     double least = std::numeric_limits<double>::infinity();
     read([&](const LocalMeasure &m) { least = std::min(least, m.longestStep(e)); });

@@ -1,5 +1,5 @@
 /*
-  Upper bounds on the next step, so that no contact is tunnelled through, no counted angle turns by more than half a turn
+  Upper bounds on the next step, so that no contact is passed over, no counted angle turns by more than half a turn
   (Batch::longestStep()), and rotation vectors stay small enough for their truncated series. The error estimate does not
   ensure this, since it is zero in free flight for any step size.
 */
@@ -17,7 +17,7 @@ namespace
 constexpr double max_rotation_per_step = 1;
 
 /* Reduces *max_step to the upper bounds of the elements of this rank */
-PetscErrorCode LimitOfElements(Runtime &R, PetscReal t, Vec U, Vec V, Vec A, double *max_step)
+PetscErrorCode LimitOfElements(Runtime &R, PetscReal t, Vec U, Vec V, Vec A, const Horizon &horizon, double *max_step)
 {
   const double       *u, *v, *a, *local[3];
   std::vector<double> acceleration;
@@ -28,7 +28,7 @@ PetscErrorCode LimitOfElements(Runtime &R, PetscReal t, Vec U, Vec V, Vec A, dou
   PetscCall(LocalMotion(R, u, v, a, acceleration, local));
   if (R.accepted_move != R.bodies.moves) R.bodies.move(local[0], local[1]); /* else the bodies are at this state already */
   const Evaluation e{t, local[0], local[1], local[2], R.bodies, R.n};
-  for (const auto &b : R.batches) *max_step = std::min(*max_step, b->longestStep(e));
+  for (const auto &b : R.batches) *max_step = std::min(*max_step, b->longestStep(e, horizon));
   PetscCall(VecRestoreArrayRead(U, &u));
   PetscCall(VecRestoreArrayRead(V, &v));
   PetscCall(VecRestoreArrayRead(A, &a));
@@ -51,12 +51,15 @@ PetscErrorCode LimitOfRotations(const Runtime &R, Vec V, double *max_step)
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode Limit(TS, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx)
+PetscErrorCode Limit(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal *h, void *ctx)
 {
   Runtime &R     = *static_cast<Runtime *>(ctx);
   double   max_step = *h;
+  Horizon horizon;
   PetscFunctionBegin;
-  if (R.steps_limited) PetscCall(LimitOfElements(R, t, U, V, A, &max_step));
+  PetscCall(TSGetTimeStep(ts, &horizon.time));
+  PetscCall(TSGetTolerances(ts, &horizon.negligible, nullptr, nullptr, nullptr));
+  if (R.steps_limited) PetscCall(LimitOfElements(R, t, U, V, A, horizon, &max_step));
   PetscCall(LimitOfRotations(R, V, &max_step));
   if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &max_step, 1, MPI_DOUBLE, MPI_MIN, R.scene.comm));
   *h = max_step;

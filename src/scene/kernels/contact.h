@@ -11,6 +11,7 @@
 #include "contact_law.h"
 #include "contact_shapes.h"
 #include "scene/kernel.h"
+#include "scene/look_ahead.h"
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -38,6 +39,10 @@ struct ContactMovement {
    the derivatives of the law by the seven numbers (d, n, v) */
 Vector3 ContactDerivatives(const ContactLaw &law, const Touch<double> &t, const Vector3 &v, const ContactMovement &by, const Frame<double> *f,
                            const Twist<double> *w, Matrix<12, 12> &frames, Matrix<12, 12> &twists);
+
+/* through() of a shape, or infinity: matter below a plane has no other side */
+template <class Shape> auto Deepest(const typename Shape::Data &d, int) -> decltype(Shape::through(d)) { return Shape::through(d); }
+template <class Shape> double Deepest(const typename Shape::Data &, long) { return std::numeric_limits<double>::infinity(); }
 
 template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
   static constexpr const char *name           = Shape::name;
@@ -99,6 +104,19 @@ template <class Shape> struct Contact : Force<Contact<Shape>, 2, 3> {
     Shape::template touch<double>(d.shape, f, t);
     return LongestApproach(Shape::through(d.shape), t.depth, -t.n.dot(slip<double>(f, w, t.p)), acceleration);
   }
+
+  /* Look-ahead, batch.h */
+  static double gap(const Data &d, const Frame<double> *f)
+  {
+    Touch<double> t;
+    Shape::template touch<double>(d.shape, f, t);
+    return -t.depth;
+  }
+  static GapBounds gapBounds(const Data &d, const MarkerForecast *m, double horizon)
+  {
+    return BoundsOfDistance(m[0], m[1], Shape::extent(d.shape), Shape::axes_of_j, horizon);
+  }
+  static double deepest(const Data &d) { return Deepest<Shape>(d.shape, 0); }
 
   /* Potential energy of the elastic part of the force */
   static double energy(const Data &d, const Frame<double> *f)

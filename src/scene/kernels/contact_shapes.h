@@ -29,6 +29,7 @@ struct SpherePlaneShape {
     double radius;
     int    axis;
   };
+  static double extent(const Data &) { return 0; } /* largest distance from i's origin of points that move where i turns */
   template <class T> static void touch(const Data &d, const Frame<T> *f, Touch<T> &t)
   {
     t.n             = f[1].R.col(d.axis);
@@ -48,6 +49,7 @@ struct EllipsoidPlaneShape {
     double a[3];
     int    axis;
   };
+  static double extent(const Data &d) { return std::max({d.a[0], d.a[1], d.a[2]}); }
   template <class T> static void touch(const Data &d, const Frame<T> *f, Touch<T> &t)
   {
     using std::sqrt;
@@ -79,6 +81,7 @@ struct TorusPlaneShape {
   struct Data {
     double radius, tube;
   };
+  static double extent(const Data &d) { return d.radius + d.tube; }
   template <class T> static void touch(const Data &d, const Frame<T> *f, Touch<T> &t)
   {
     using std::sqrt;
@@ -110,6 +113,7 @@ struct SphereSphereShape {
     double radius_i, radius_j;
   };
   static double through(const Data &d) { return 0.5 * std::min(d.radius_i, d.radius_j); }
+  static double extent(const Data &) { return 0; }
   template <class T> static void touch(const Data &d, const Frame<T> *f, Touch<T> &t)
   {
     using std::sqrt;
@@ -135,6 +139,7 @@ struct SphereBoxShape {
     double radius, half[3];
   };
   static double through(const Data &d) { return 0.5 * std::min({d.radius, d.half[0], d.half[1], d.half[2]}); }
+  static double extent(const Data &) { return 0; }
   template <class T> static void touch(const Data &d, const Frame<T> *f, Touch<T> &t)
   {
     using std::sqrt;

@@ -9,6 +9,8 @@
 
 #include "curve_spline.h"
 #include "primitives.h"
+#include <cmath>
+#include <limits>
 #include <memory>
 
 namespace hhtdae
@@ -65,6 +67,14 @@ template <int R> struct OnCurve : Constraint<OnCurve<R>, 2, R> {
   {
     const Curve &curve = *data.curve;
     data.memory[0]     = curve.path().wrapped(curve.closest(Local<double>(f), data.memory[0]));
+  }
+
+  /* A step passes over no piece of the curve: its ends alone would not show a bump between them (Curve.ABumpOnAStraightTrack) */
+  static double longestStep(const Data &data, const Frame<double> *f, const Twist<double> *w, double acceleration, double)
+  {
+    const double way = data.curve->path().shortestPiece(data.memory[0]), speed = (w[0].v - w[1].v - w[1].w.cross(f[0].x - f[1].x)).norm();
+    const double fast = speed + std::sqrt(speed * speed + 2 * acceleration * way);
+    return fast > 0 ? 2 * way / fast : std::numeric_limits<double>::infinity();
   }
 
 private:

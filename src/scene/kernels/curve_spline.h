@@ -12,6 +12,7 @@
 #include "scene/frames.h"
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,17 @@ public:
   double length() const { return knots_.empty() ? 0 : knots_.back() - knots_.front(); }
   double wrapped(double s) const { return periodic_ ? s - length() * std::floor((s - knots_.front()) / length()) : s; }
   const std::vector<double> &knots() const { return knots_; }
+  /* The shortest of the pieces at s and beside it; those beyond the ends of an open spline are straight, and do not count */
+  double shortestPiece(double s) const
+  {
+    const std::ptrdiff_t n = (std::ptrdiff_t)knots_.size() - 1, at = std::upper_bound(knots_.begin(), knots_.end(), wrapped(s)) - knots_.begin() - 1;
+    double               least = std::numeric_limits<double>::infinity();
+    for (std::ptrdiff_t k = at - 1; k <= at + 1; k++) {
+      const std::ptrdiff_t i = periodic_ ? (k + n) % n : k;
+      if (i >= 0 && i < n) least = std::min(least, knots_[i + 1] - knots_[i]);
+    }
+    return std::isfinite(least) ? least : s < knots_.front() ? knots_.front() - s : s - knots_.back();
+  }
 
   /* value and derivatives; s may be a dual number */
   template <class T> void operator()(const T &s, Vec3<T> &c, Vec3<T> &c1, Vec3<T> &c2) const

@@ -178,7 +178,7 @@ public:
 
   /* As in contact.h, except that the allowed penetration is up to the centres of both balls, because a small ball may be deep in a large one */
   bool   limitsSteps() const override { return !all.empty() && std::isfinite(Near::through(all[0].data.shape)); }
-  double longestStep(const Evaluation &ev) const override
+  double longestStep(const Evaluation &ev, const Horizon &) const override
   {
     double least = std::numeric_limits<double>::infinity();
     for (const Instance &e : all) {

@@ -7,6 +7,7 @@
 #define HHTDAE_SCENE_KERNELS_STOP_H
 
 #include "contact_law.h"
+#include "scene/look_ahead.h"
 #include "spring_torsion.h"
 
 namespace hhtdae
@@ -20,6 +21,7 @@ struct StopData {
 
   bool   free(double s) const { return s >= lower && s <= upper; }
   double depth(double s) const { return s < lower ? lower - s : s - upper; }
+  double gap(double s) const { return std::min(s - lower, upper - s); }
 };
 
 /* Force or moment in the direction of increasing s */
@@ -53,6 +55,13 @@ struct TurnStop : TurnForce<TurnStop> {
   {
     c[0] = StopForce<T>(d, UnwoundAngle<T>(f[0], f[1], d.memory[0]), AngleRate<T>(f[0], f[1], w[0], w[1]));
   }
+  /* Look-ahead, batch.h; TurnForce::longestStep() keeps a step below half a turn */
+  static double    gap(const Data &d, const Frame<double> *f) { return d.gap(UnwoundAngle<double>(f[0], f[1], d.memory[0])); }
+  static GapBounds gapBounds(const Data &, const MarkerForecast *m, double)
+  {
+    return {(m[0].w - m[1].w).norm(), m[0].alpha.norm() + m[1].alpha.norm() + m[0].w.cross(m[1].w).norm()};
+  }
+  static double deepest(const Data &) { return std::numeric_limits<double>::infinity(); }
   static double energy(const Data &d, const Frame<double> *f) { return StopEnergy(d, UnwoundAngle<double>(f[0], f[1], d.memory[0])); }
 
   template <int Z>
@@ -79,6 +88,9 @@ struct AdvanceStop : Force<AdvanceStop, 2, 1> {
   {
     c[0] = StopForce<T>(d, Advance<T>(f[0], f[1], d.axis), AdvanceRate<T>(f[0], f[1], w[0], w[1], d.axis));
   }
+  static double    gap(const Data &d, const Frame<double> *f) { return d.gap(Advance<double>(f[0], f[1], d.axis)); }
+  static GapBounds gapBounds(const Data &, const MarkerForecast *m, double horizon) { return BoundsOfDistance(m[0], m[1], 0, true, horizon); }
+  static double    deepest(const Data &) { return std::numeric_limits<double>::infinity(); }
   template <class T> static void apply(const Data &d, const Frame<T> *f, const T *c, Wrench<T> *on)
   {
     const Vec3<T> force = f[1].R.col(d.axis) * c[0], arm = f[0].x - f[1].x;
@@ -106,6 +118,14 @@ struct LengthStop : LineForce<LengthStop> {
     const Line<T> line(f);
     c[0] = T(0) - StopForce<T>(d, line.length, line.rate(w));
   }
+  /* The second derivative of a distance has no bound where it is short */
+  static double    gap(const Data &d, const Frame<double> *f) { return d.gap(Line<double>(f).length); }
+  static GapBounds gapBounds(const Data &, const MarkerForecast *m, double horizon)
+  {
+    const GapBounds b = BoundsOfDistance(m[0], m[1], 0, false, horizon);
+    return {b.rate + horizon * b.second, std::numeric_limits<double>::infinity()};
+  }
+  static double deepest(const Data &) { return std::numeric_limits<double>::infinity(); }
   static double energy(const Data &d, const Frame<double> *f) { return StopEnergy(d, Line<double>(f).length); }
 
   /* A lower limit of a distance acts like two balls, which must not pass through each other in a step (Stops.NothingFliesThroughALeastDistance). */
