@@ -90,18 +90,19 @@ PetscErrorCode NoteStiffness(TS ts, Vec X, Mat P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* noise = |F(x + dx) - F|, where F is the residual at X and dx are pseudo-random rounding errors of all that the residual depends on:
-   the unknowns, and positions, states and velocities as sums of terms. All quantities of one unknown have the same random factor, so
-   that they do not cancel. (If X alone were changed, rounding of positions would change velocities, too, by far more than their
-   rounding if h is small: for a body at rest in a steep brake all of the force would count as rounding.) */
-static PetscErrorCode SampleRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
+/* noise = maximum of noise and |F(x + dx) - F|, where F is the residual at X and dx are pseudo-random rounding errors of all that the
+   residual depends on: the unknowns, and positions, states and velocities as sums of terms. All quantities of one unknown have the same
+   random factor, so that they do not cancel. (If X alone were changed, rounding of positions would change velocities, too, by far more
+   than their rounding if h is small: for a body at rest in a steep brake all of the force would count as rounding.) */
+PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
 {
   Integrator &I = Get(ts);
-  WorkVec     near;
+  WorkVec     near, sample;
   PetscInt    first;
 
   PetscFunctionBegin;
   PetscCall(near.like(X, I.spare));
+  PetscCall(sample.like(X, I.spare));
   PetscCall(VecCopy(X, near));
   PetscCall(VecGetOwnershipRange(X, &first, NULL));
   const auto rounding = [=](PetscInt i) { return rounding_of_sums * RandomRounding(first + i, salt); };
@@ -116,31 +117,21 @@ static PetscErrorCode SampleRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noi
       v += rounding(i) * (PetscAbsScalar(v) + turn);
     },
     Read(I.ymax), Read(I.A1), Write(I.U1), Write(I.V1)));
-  PetscCall(SNESComputeFunction(ts->snes, near, noise));
-  PetscCall(VecAXPY(noise, -1, F));
-  PetscCall(VecAbs(noise));
+  PetscCall(SNESComputeFunction(ts->snes, near, sample));
+  PetscCall(VecAXPY(sample, -1, F));
+  PetscCall(VecAbs(sample));
+  PetscCall(VecPointwiseMax(noise, noise, sample));
   PetscCall(StageVectors(ts, X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* noise = maximum of noise and another sample: in a single sample the unknowns at both ends of a stiff spring may have the same
-   change, which does not change its force (Stiff.FastModeBesideASlowOne) */
-PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise)
-{
-  WorkVec other;
-
-  PetscFunctionBegin;
-  PetscCall(other.like(noise, Get(ts).spare));
-  PetscCall(SampleRounding(ts, X, F, salt, other));
-  PetscCall(VecPointwiseMax(noise, noise, other));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
+/* By two samples: in a single one the unknowns at both ends of a stiff spring may have the same change, which does not change its force
+   (Stiff.FastModeBesideASlowOne) */
 PetscErrorCode MeasureRounding(TS ts, Vec X, Vec F, Vec noise)
 {
   PetscFunctionBegin;
-  PetscCall(SampleRounding(ts, X, F, 1, noise));
-  PetscCall(AddRounding(ts, X, F, 2, noise));
+  PetscCall(VecZeroEntries(noise));
+  for (unsigned salt : {1u, 2u}) PetscCall(AddRounding(ts, X, F, salt, noise));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

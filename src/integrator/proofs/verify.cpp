@@ -150,7 +150,7 @@ PetscErrorCode ModelResidual(TS ts, Vec dX)
 }
 
 /* Compares the residual F after a correction with the model of the correction */
-PetscErrorCode CompareWithModel(TS ts, Vec F, Imbalance *left)
+static PetscErrorCode CompareWithModel(TS ts, Vec F, Imbalance *left)
 {
   Integrator &I     = Get(ts);
   const bool  known = RateIsKnown(I);

@@ -76,7 +76,6 @@ PetscErrorCode AddRounding(TS ts, Vec X, Vec F, unsigned salt, Vec noise);
 /* verify.cpp */
 PetscErrorCode SubstituteDefinitions(TS ts, Vec R);
 PetscErrorCode ModelResidual(TS ts, Vec dX);
-PetscErrorCode CompareWithModel(TS ts, Vec F, Imbalance *left);
 PetscErrorCode CompareAboveRounding(TS ts, Vec X, Vec F, PetscReal enough, Imbalance *left);
 /* wrong_jacobian.cpp */
 PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong);

@@ -64,7 +64,7 @@ PetscErrorCode MissOfPositions(TS ts, PetscReal *e)
   Integrator &I = Get(ts);
 
   PetscFunctionBegin;
-  PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0)); /* leaves no accelerations */
+  PetscCall(StartMatrix(ts)); /* leaves no accelerations */
   PetscCall(EvaluateResidual(ts, ts->ptime, I.U0, I.V0, I.A1, I.gamma));
   PetscCall(TakeRoles(I, I.gamma, {TSHHT3_HOLONOMIC}, I.work));
   PetscCall(SolveStart(ts, I.work, I.X));
@@ -270,7 +270,7 @@ PetscErrorCode CheckInitialState(TS ts, Prepared *prepared)
   }
   if (!I.constraints() || I.start_policy == TSHHT3_START_OFF) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CheckPositions(ts, &matrix));
-  if (!matrix) PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
+  if (!matrix) PetscCall(StartMatrix(ts));
   PetscCall(CheckVelocities(ts, project, prepared, &e, &row, &value));
   PetscCall(ReportInconsistency(ts, "velocities", " (times the time scale of the motion)", e, row, value, (PetscBool)project));
   PetscFunctionReturn(PETSC_SUCCESS);

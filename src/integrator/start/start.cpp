@@ -161,9 +161,9 @@ PetscErrorCode Advance(const Integrator &I, PetscReal d, Vec U, Vec V)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With the multipliers of U: a failed correction may have left others in X, of any size, which would stand in the matrix beside the inertia
+/* With the multipliers of U0: a failed correction may have left others in X, of any size, which would stand in the matrix beside the inertia
    (Failures.MultipliersOfAFailedCorrection) */
-PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
+PetscErrorCode StartMatrix(TS ts)
 {
   Integrator &I = Get(ts);
   Consistent  c;
@@ -171,8 +171,8 @@ PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V)
   PetscBool   ok;
 
   PetscFunctionBegin;
-  PetscCall(TakeRoles(I, U, algebraic_roles, I.X));
-  PetscCall(ConsistentOfRun(ts, t, U, V, &c));
+  PetscCall(TakeRoles(I, I.U0, algebraic_roles, I.X));
+  PetscCall(ConsistentOfRun(ts, ts->ptime, I.U0, I.V0, &c));
   PetscCall(TakeUnknowns(I, c));
   PetscCall(ConsistentMatrix(ts, c, &ok, &why));
   PetscCall(NoteInertia(ts, c.P));

@@ -40,8 +40,8 @@ PetscBool      IsFarShorter(const Integrator &I, PetscReal h);
 PetscErrorCode IsTinyStep(TS ts, PetscReal h, PetscBool *tiny);
 PetscErrorCode TinyStep(TS ts, PetscBool *tiny, PetscBool *ok);
 
-/* The matrix of the start, [M Phi_q^T; Phi_q 0] at U, V, factored */
-PetscErrorCode StartMatrix(TS ts, PetscReal t, Vec U, Vec V);
+/* The matrix of the start, [M Phi_q^T; Phi_q 0] at t_n, U0, V0, factored */
+PetscErrorCode StartMatrix(TS ts);
 
 /* Of use to the files of the start alone, from here on. Where no solve with that matrix is possible, NameRedundant() is the error that says why. */
 PetscErrorCode NameRedundant(TS ts);

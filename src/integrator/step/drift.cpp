@@ -61,7 +61,7 @@ PetscErrorCode SolveNormal(TS ts, Vec dV)
   PetscCall(KSPSetReusePreconditioner(ksp, reuse));
   PetscCall(failed);
   if (!ok) {
-    PetscCall(StartMatrix(ts, ts->ptime, I.U0, I.V0));
+    PetscCall(StartMatrix(ts));
     PetscCall(SolveOfTheRun(ts, I.gamma, dV, &ok));
   }
   if (!ok) PetscCall(VecZeroEntries(dV));
