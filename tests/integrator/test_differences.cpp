@@ -100,6 +100,50 @@ TEST(Differences, GiveTheSameAnswer)
   }
 }
 
+/* Masses on springs, one of which also feels another one: a diagonal matrix has no place for that, and its unknowns are all of one color, so that the row changes with its own
+   unknown in any case. Of 40 such places half may hide where colors are halved only once, and a sixteenth does. */
+TEST(Differences, PlacesThatColorsHide)
+{
+  struct Masses : Problem {
+    PetscInt felt = 1;
+    Masses()
+    {
+      n    = 41;
+      role = std::vector<TSHHT3Role>(n, TSHHT3_COORDINATE);
+    }
+    void initial(double *u, double *v) const override { std::fill_n(u, n, 0.1), std::fill_n(v, n, 0.); }
+    void residual(double, const double *u, const double *, const double *a, double *f) const override
+    {
+      for (PetscInt i = 0; i < n; i++) f[i] = a[i] + u[i];
+      f[0] += u[felt];
+    }
+    void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+    {
+      for (PetscInt i = 0; i < n; i++) J.add(i, i, sa + 1);
+    }
+  } p;
+  int found = 0;
+  for (p.felt = 1; p.felt < p.n; p.felt++) {
+    const WithoutJacobian run(p);
+    SNES                  snes;
+    Mat                   P;
+    must(MatCreateSeqAIJ(PETSC_COMM_SELF, p.n, p.n, 1, nullptr, &P));
+    for (PetscInt i = 0; i < p.n; i++) must(MatSetValue(P, i, i, 0, INSERT_VALUES));
+    must(MatAssemblyBegin(P, MAT_FINAL_ASSEMBLY));
+    must(MatAssemblyEnd(P, MAT_FINAL_ASSEMBLY));
+    must(TSGetSNES(run.ts, &snes));
+    must(SNESSetJacobian(snes, P, P, SNESComputeJacobianDefaultColor, nullptr));
+    ErrorTrap trap;
+    if (TSSetUp(run.ts)) {
+      found++;
+      EXPECT_TRUE(trap.says("no place for derivatives of row 0")) << trap.message;
+    }
+    must(MatDestroy(&P));
+  }
+  MEASURED("%d of %d hidden places are found", found, (int)p.n - 1);
+  EXPECT_GE(found, 36);
+}
+
 /* A pendulum whose matrix for colored differences lacks the entries of the constraint, or has all entries */
 TEST(Differences, MatricesWithoutPlaces)
 {
