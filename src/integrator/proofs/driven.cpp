@@ -30,7 +30,7 @@ constexpr PetscReal driven_response = 1e-9; /* an acceleration below this part o
 /* The residual in the rows of driven coordinates, less its rounding as far as measured, in units of the tolerance */
 PetscErrorCode InDriven(TS ts, Vec F, PetscReal *left)
 {
-  PetscReal sum[4];
+  PetscReal sum[2];
 
   PetscFunctionBegin;
   PetscCall(SumRows(ts, sum, [](const RowScale &s, PetscReal local[], PetscReal driven, PetscReal f) { local[0] += PetscSqr(driven * PetscMax(0, PetscAbsReal(f) * s.answer - rounding_factor * s.rounding)); },

@@ -44,13 +44,13 @@ private:
   const PetscReal   claimed[2], answer[2]; /* of coordinates, and of states */
 };
 
-/* Calls entry(scale, sum, x...), which adds to the four sums, for all rows with inertia on all ranks; x: entries of further vectors */
+/* Calls entry(scale, sum, x...), which adds to both sums, for all rows with inertia on all ranks; x: entries of further vectors */
 template <class Entry, class... More>
-PetscErrorCode SumRows(TS ts, PetscReal sum[4], Entry entry, More... more)
+PetscErrorCode SumRows(TS ts, PetscReal sum[2], Entry entry, More... more)
 {
   Integrator         &I        = Get(ts);
   const Verification &v        = I.verify;
-  PetscReal           local[4] = {0, 0, 0, 0};
+  PetscReal           local[2] = {0, 0};
   const RowScales     scale(I);
 
   PetscFunctionBegin;
@@ -59,7 +59,7 @@ PetscErrorCode SumRows(TS ts, PetscReal sum[4], Entry entry, More... more)
       if (PetscRealPart(m) > 0) entry(scale(i, m, w, noise, unproved), local, PetscRealPart(x)...);
     },
     Read(v.inertia), Read(I.weight), Read(v.noise), Read(v.unproved), more...));
-  PetscCallMPI(MPI_Allreduce(local, sum, 4, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
+  PetscCallMPI(MPI_Allreduce(local, sum, 2, MPIU_REAL, MPIU_SUM, PetscObjectComm((PetscObject)ts)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -67,7 +67,6 @@ PetscErrorCode SumRows(TS ts, PetscReal sum[4], Entry entry, More... more)
 struct Imbalance {
   PetscReal all  = 0; /* of all rows, within this step */
   PetscReal stay = 0; /* of rows whose residual has stayed about as it was, over the time since they were proved */
-  PetscReal part = 0; /* part of the former residual that is still there: (new, old)/(old, old) */
 };
 
 /* stiffness.cpp */

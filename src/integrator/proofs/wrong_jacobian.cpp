@@ -22,7 +22,7 @@ bool HasFollowed(const RowScale &s, PetscReal now, PetscReal was) { return Petsc
 PetscErrorCode MeasureAnswer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forces, PetscReal *answer)
 {
   Verification &v = Get(ts).verify;
-  PetscReal     sum[4];
+  PetscReal     sum[2];
   WorkVec       Y, change;
 
   PetscFunctionBegin;
@@ -38,11 +38,11 @@ PetscErrorCode MeasureAnswer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, V
     [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal m, PetscReal d) {
       const PetscReal model = m * s.answer;
       if (PetscAbsReal(way * model) < s.rounding || HasFollowed(s, f, m)) return;
-      local[1] += d * s.answer * model;
-      local[2] += way * model * model;
+      local[0] += d * s.answer * model;
+      local[1] += way * model * model;
     },
     Read(F), Read(v.model), Read(change)));
-  *answer = sum[2] != 0 ? PetscAbsReal(sum[1] / sum[2]) : -1;
+  *answer = sum[1] != 0 ? PetscAbsReal(sum[0] / sum[1]) : -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
