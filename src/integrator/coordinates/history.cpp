@@ -45,10 +45,7 @@ Motion Recall(const Integrator &I)
   m.nodes = m.n = p.available + 1;
   m.unit        = I.h_last > 0 ? I.h_last : 1;
   for (PetscInt k = 0; k < m.nodes; k++) {
-    /* Length of the step that ended at t_{n-k}. It is not known for the last node, nor for the one before if the last one gives the
-       slope of a start. */
-    const PetscReal h = k > 0 && k < m.nodes - 1 ? p.t[k] - p.t[k + 1] : 0;
-    if (k > 0 && h > 20 * slope_fraction * (p.t[k - 1] - p.t[k])) lag = I.p.lag() * h;
+    if (k > 0 && k < m.nodes - 1) lag = I.p.lag() * (p.t[k] - p.t[k + 1]); /* of the step that ended at t_{n-k}; it is not known for the last node */
     m.x[k]      = p.t[k] - p.t[0] + lag;
     m.stored[k] = p.X[k];
   }
