@@ -347,20 +347,13 @@ PetscErrorCode SizeOfAccelerations(TS ts, Differences *d)
 
   PetscFunctionBegin;
   for (WorkVec *v : {&x[0], &x[1], &x[2], &F0, &A, &F}) PetscCall(v->like(ts->vec_sol));
-  for (const bool elsewhere : {false, true}) {
-    PetscCall(VecCopy(ts->vec_sol, x[0]));
-    PetscCall(VecCopy(ts->vec_dot, x[1]));
-    PetscCall(VecZeroEntries(x[2]));
-    if (elsewhere) PetscCall(StateOffStart(ts, 1, 0, x[0], x[1], x[2]));
-    PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
-    for (PetscReal size = d->size; size <= largest_size; size *= size_ratio) {
-      PetscCall(TrySize(ts, x, size, F0, A, F, &enough, &finite));
-      if (!finite) break;
-      if (enough) { /* never where there is no inertia */
-        d->size = size;
-        break;
-      }
-    }
+  PetscCall(VecCopy(ts->vec_sol, x[0]));
+  PetscCall(VecCopy(ts->vec_dot, x[1]));
+  PetscCall(EvaluateResidual(ts, ts->ptime, x[0], x[1], x[2], F0));
+  for (PetscReal size = 1; size <= largest_size && !enough; size *= size_ratio) { /* never enough where there is no inertia */
+    PetscCall(TrySize(ts, x, size, F0, A, F, &enough, &finite));
+    if (!finite) break;
+    if (enough) d->size = size;
   }
   if (d->size > 1) PetscCall(PetscInfo(ts, "dF/dU'' by differences: forces are large, steps are those of accelerations of %g\n", (double)d->size));
   PetscFunctionReturn(PETSC_SUCCESS);
