@@ -430,16 +430,13 @@ PetscErrorCode DifferencesJacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, Pets
   Vec             at[3]    = {U, V, A};
 
   PetscFunctionBegin;
-  PetscReal norm;
-  PetscCall(VecNorm(A, NORM_2, &norm));
-  const PetscReal size = PetscMax(1, d->size / PetscSqrtReal(1 + norm)); /* MatFDColoring makes steps relative to this root */
   d->t = t;
   for (int k = 0; k < 3; k++) d->at[k] = at[k];
   PetscCall(MatZeroEntries(P));
   for (d->which = 0; d->which < 3; d->which++) {
     if (shift[d->which] == 0) continue;
     PetscCall(MatZeroEntries(d->part));
-    PetscCall(MatFDColoringSetParameters(d->coloring, d->relative > 0 ? d->relative : relative_step[d->which] * (d->which == 2 ? size : 1), d->least > 0 ? d->least : 1));
+    PetscCall(MatFDColoringSetParameters(d->coloring, d->relative > 0 ? d->relative : relative_step[d->which] * (d->which == 2 ? d->size : 1), d->least > 0 ? d->least : 1));
     PetscCall(MatFDColoringApply(d->part, d->coloring, at[d->which], NULL));
     PetscCall(MatAXPY(P, shift[d->which], d->part, SAME_NONZERO_PATTERN));
   }
