@@ -249,7 +249,7 @@ PetscErrorCode RowBeside(TS ts, Mat ones, IS color, int half, const WorkVec (&x)
   PetscCall(ISGetLocalSize(color, &n));
   PetscCall(ISGetIndices(color, &index));
   for (PetscInt k = 0; k < n; k++)
-    if (InHalf(index[k], half)) PetscCall(VecSetValue(mark, index[k], 1 + index[k] % 1000 * 7919 % 13, INSERT_VALUES)); /* what they do shall not cancel */
+    if (InHalf(index[k], half)) PetscCall(VecSetValue(mark, index[k], 1, INSERT_VALUES));
   PetscCall(ISRestoreIndices(color, &index));
   PetscCall(VecAssemblyBegin(mark));
   PetscCall(VecAssemblyEnd(mark));
