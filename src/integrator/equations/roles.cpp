@@ -31,12 +31,7 @@ struct Probe {
   explicit Probe(PetscInt n) : col_a(n), col_v(n), row_a(n), row_v(n), row_u(n), self(n) {}
 };
 
-/* least: what counts as nothing in this row, for matrices made of differences */
-bool DoublesWithShift(PetscScalar one, PetscScalar two, PetscReal least)
-{
-  const PetscReal d = PetscAbsScalar(two - one);
-  return d > 1e-10 * PetscMax(PetscAbsScalar(one), PetscAbsScalar(two)) && d > least;
-}
+bool DoublesWithShift(PetscScalar one, PetscScalar two) { return PetscAbsScalar(two - one) > 1e-10 * PetscMax(PetscAbsScalar(one), PetscAbsScalar(two)); }
 
 /* Flags of the local unknowns that a vector marks with positive entries */
 PetscErrorCode TakeMarks(Vec mark, std::vector<unsigned char> &flag)
@@ -67,11 +62,8 @@ PetscErrorCode ProbeShift(TS ts, Mat J, Mat P, Vec U, Vec V, Vec A, bool acceler
   PetscCall(mark.like(U));
   PetscCall(VecGetOwnershipRange(U, &start, NULL));
   for (size_t i = 0; i < row_flag.size(); i++) {
-    PetscReal least = 0;
-    if (Get(ts).differences)
-      for (PetscInt k = offset[i]; k < offset[i + 1]; k++) least = PetscMax(least, 1e-6 * PetscAbsScalar(two[k] - one[k]));
     for (PetscInt k = offset[i]; k < offset[i + 1]; k++) {
-      if (!DoublesWithShift(one[k], two[k], least)) continue;
+      if (!DoublesWithShift(one[k], two[k])) continue;
       row_flag[i] = 1;
       PetscCall(VecSetValue(mark, col[k], 1, ADD_VALUES));
       if (probe.triangle) PetscCall(VecSetValue(mark, start + (PetscInt)i, 1, ADD_VALUES));
