@@ -227,7 +227,7 @@ PetscErrorCode VerifyCorrection(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluate
   }
   PetscCall(PetscInfo(ts, "corrector: the residual has not followed a correction of %g of the tolerance at t = %g: with inertia alone it moves positions by %g of the tolerance\n",
                       (double)c.e, (double)I.t1, (double)left.all));
-  if (c.matrix.fresh) PetscCall(CheckJacobian(ts, dX, F, &c.wrong_jacobian));
+  if (c.matrix.fresh) PetscCall(CheckJacobian(ts, dX, &c.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

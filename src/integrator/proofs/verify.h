@@ -77,7 +77,7 @@ PetscErrorCode SubstituteDefinitions(TS ts, Vec R);
 PetscErrorCode ModelResidual(TS ts, Vec dX);
 PetscErrorCode CompareAboveRounding(TS ts, Vec X, Vec F, PetscReal enough, Imbalance *left);
 /* wrong_jacobian.cpp */
-PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong);
+PetscErrorCode CheckJacobian(TS ts, Vec dX, PetscBool *wrong);
 
 } // namespace hht3
 

@@ -14,12 +14,10 @@ namespace
 constexpr PetscReal probe_fraction = 0.25; /* part of the correction by which probes go to either side: near, to avoid corners of the model, but well above rounding */
 constexpr PetscReal least_answer   = 0.1;  /* ratio of actual to expected change below which the Jacobian is wrong: ten corrections would not suffice */
 
-bool HasFollowed(const RowScale &s, PetscReal now, PetscReal was) { return PetscAbsReal(now) * s.answer <= unanswered_fraction * PetscAbsReal(was) * s.answer + s.rounding; }
-
 /* *answer: ratio of the actual change of the residual to the one that the matrix predicts, from the X at which the matrix was made to
-   X - way dX; 1 if the Jacobian is right there. Only rows count that have not followed dX and exceed rounding; the constraint
-   `forces` of dX are taken from the matrix. -1: there are no such rows. */
-PetscErrorCode MeasureAnswer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, Vec forces, PetscReal *answer)
+   X - way dX; 1 if the Jacobian is right there. Only rows above rounding count; the constraint `forces` of dX are taken from
+   the matrix. -1: there are no such rows. */
+PetscErrorCode MeasureAnswer(TS ts, PetscReal way, Vec dX, Vec F_where, Vec forces, PetscReal *answer)
 {
   Verification &v = Get(ts).verify;
   PetscReal     sum[2];
@@ -35,23 +33,23 @@ PetscErrorCode MeasureAnswer(TS ts, PetscReal way, Vec dX, Vec F, Vec F_where, V
   PetscCall(VecAXPY(change, -way, forces));
   PetscCall(SumRows(
     ts, sum,
-    [&](const RowScale &s, PetscReal local[], PetscReal f, PetscReal m, PetscReal d) {
+    [&](const RowScale &s, PetscReal local[], PetscReal m, PetscReal d) {
       const PetscReal model = m * s.answer;
-      if (PetscAbsReal(way * model) < s.rounding || HasFollowed(s, f, m)) return;
+      if (PetscAbsReal(way * model) < s.rounding) return;
       local[0] += d * s.answer * model;
       local[1] += way * model * model;
     },
-    Read(F), Read(v.model), Read(change)));
+    Read(v.model), Read(change)));
   *answer = sum[1] != 0 ? PetscAbsReal(sum[0] / sum[1]) : -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 } // namespace
 
-/* The residual F at X has not followed the correction dX, made with a matrix of this very iteration. That may be a property of the
+/* The residual has not followed the correction dX, made with a matrix of this very iteration. That may be a property of the
    model, such as a contact that ends on the way. *wrong: the Jacobian is wrong where it was evaluated, as the residual there responds
    in neither direction along dX. */
-PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
+PetscErrorCode CheckJacobian(TS ts, Vec dX, PetscBool *wrong)
 {
   Verification &v = Get(ts).verify;
   PetscReal     answer[2];
@@ -63,7 +61,7 @@ PetscErrorCode CheckJacobian(TS ts, Vec dX, Vec F, PetscBool *wrong)
   PetscCall(VecCopy(v.work, forces));
   PetscCall(SubstituteDefinitions(ts, forces));
   PetscCall(SNESComputeFunction(ts->snes, v.where, F_where));
-  for (int k = 0; k < 2; k++) PetscCall(MeasureAnswer(ts, k ? -probe_fraction : probe_fraction, dX, F, F_where, forces, &answer[k]));
+  for (int k = 0; k < 2; k++) PetscCall(MeasureAnswer(ts, k ? -probe_fraction : probe_fraction, dX, F_where, forces, &answer[k]));
   *wrong = (PetscBool)(answer[0] >= 0 && answer[0] < least_answer && answer[1] >= 0 && answer[1] < least_answer);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -79,7 +77,7 @@ PetscErrorCode BlameJacobian(TS ts, Vec X, Vec dX, Vec F, PetscBool *evaluated)
   *evaluated = PETSC_TRUE;
   PetscCall(ModelResidual(ts, dX));
   PetscCall(CompareAboveRounding(ts, X, F, 0, &left));
-  if (left.all > 0) PetscCall(CheckJacobian(ts, dX, F, &I.corrector.wrong_jacobian));
+  if (left.all > 0) PetscCall(CheckJacobian(ts, dX, &I.corrector.wrong_jacobian));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
