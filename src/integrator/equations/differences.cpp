@@ -309,9 +309,7 @@ namespace
 {
 
 constexpr PetscReal visible_change     = 1e-6;  /* change of a row, relative to its value, that leaves ten digits of an inertia */
-constexpr PetscReal row_rounding       = 8 * PETSC_MACHINE_EPSILON; /* of a row: its change is none */
 constexpr PetscReal hidden_inertia     = 1e-6;  /* of the largest inertia: what may be lost in rounding */
-constexpr PetscReal negligible_inertia = 1e-12; /* of the largest inertia: what a change beyond rounding need not be, but for sums in another order */
 constexpr PetscReal size_ratio         = 1e4;   /* the next size */
 constexpr PetscReal largest_size       = 1e16;
 
@@ -331,7 +329,7 @@ PetscErrorCode TrySize(TS ts, const WorkVec (&x)[3], PetscReal size, Vec F0, Vec
   PetscCall(ForEntries(
     [&](PetscInt, PetscScalar f0, PetscScalar f) {
       const PetscReal d = PetscAbsScalar(f - f0), size0 = PetscAbsScalar(f0);
-      if (d < visible_change * size0 && (d > row_rounding * size0 ? d > negligible_inertia * max : PETSC_MACHINE_EPSILON * size0 > hidden_inertia * max)) hidden = true;
+      if (d < visible_change * size0 && PETSC_MACHINE_EPSILON * size0 > hidden_inertia * max) hidden = true;
     },
     Read(F0), Read(F)));
   PetscCall(OnAllRanks(ts, !hidden, enough));
