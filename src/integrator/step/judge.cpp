@@ -177,7 +177,6 @@ PetscErrorCode MeasureRate(TS ts, PetscReal e)
   if (c.it - c.base < 2) PetscFunctionReturn(PETSC_SUCCESS);
   c.matrix.rate   = xi;
   c.xi_max = PetscMax(c.xi_max, xi);
-  if (xi >= c.slow_rate && c.renewals < max_renewals) PetscCall(FreshMatrixNextIteration(ts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
