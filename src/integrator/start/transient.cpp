@@ -76,7 +76,7 @@ PetscErrorCode RemoveTransient(TS ts, PetscReal h, Vec rate, Prepared &have, Pet
     PetscCall(VecScale(gone, euler / (1 - 1 / second_step_ratio)));
     PetscCall(CorrectionNorm(ts, gone, 1, &way));
     way *= *tau / PetscAbsReal(I.p.k); /* of velocities that decay with this time constant, in tolerances of positions */
-    if (!I.fixed_h && !(way < 1)) *leaves = PETSC_FALSE; /* steps that are given resolve nothing */
+    if (!(way < 1)) *leaves = PETSC_FALSE;
   }
   if (*leaves) PetscCall(VecAXPY(I.V0, 1, gone));
   else PetscCall(VecCopy(I.X0, I.X));
