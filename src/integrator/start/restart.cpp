@@ -4,7 +4,6 @@
 #include "integrator/equations/equations.h"
 #include "integrator/step/estimate.h"
 #include "integrator/step/order.h"
-#include "integrator/step/predictor.h"
 #include "start.h"
 #include "integrator/work_vec.h"
 
