@@ -105,12 +105,13 @@ PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<Counte
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first)
+PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first, bool *turns_known)
 {
   const SceneData          &s    = R.scene;
   double                    largest = PETSC_NINFINITY, x;
   std::vector<CountedAngle> now{{i, j, 0, 0}};
   PetscFunctionBegin;
+  *turns_known = true;
   for (const auto &b : R.batches)
     if (b->countedAngle(i, j, &x)) largest = std::max(largest, x);
   if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPI_DOUBLE, MPI_MAX, s.comm));
@@ -123,6 +124,7 @@ PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt 
     now[0].angle  = StartAngle(*R.model, Marker{i}, Marker{j});
     now[0].turned = InitialPlanarAngle(s, i) - InitialPlanarAngle(s, j);
   } else if (PrescribedAngle(*R.model, t, i, j, &x)) now[0].angle = x;
+  else *turns_known = false;
   PetscCall(CountAngles(R, u, now));
   *first = now[0];
   PetscFunctionReturn(0);

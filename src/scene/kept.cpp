@@ -1,7 +1,8 @@
 /*
   Writes and reads the last entries of the checkpoint vector of a scene (Runtime::axes), which are the same on every rank:
   values of parameters, a digest of the description, and the state of the recorder, so that a resumed run continues the same
-  output files. Also compares the descriptions of different ranks by digests.
+  output files. Beside the vector checkpoints have numbers whose count changes during the run: queried angles, Runtime::notes.
+  Also compares the descriptions of different ranks by digests.
 */
 #include "runtime.h"
 #include "start.h"
@@ -65,6 +66,13 @@ void AddToDigest(Digest &d, const BodyData &b)
   for (const double x : b.flexible->damping) d.number(x);
 }
 
+void AddToDigest(Digest &d, const MarkerData &m)
+{
+  d.integer(m.body);
+  d.numbers(m.s);
+  d.numbers(m.R);
+}
+
 void AddToDigest(Digest &d, const StoreBase &s)
 {
   d.integer(s.isConstraint());
@@ -89,12 +97,7 @@ Digest MakeDigest(const SceneData &s)
   d.numbers(s.gravity);
   d.integer((long)s.ground_acceleration.size());
   for (const BodyData &b : s.bodies) AddToDigest(d, b);
-  for (std::size_t k = 0; k < s.ownMarkers(); k++) {
-    const MarkerData &m = s.markers[k];
-    d.integer(m.body);
-    d.numbers(m.s);
-    d.numbers(m.R);
-  }
+  for (std::size_t k = 0; k < s.ownMarkers(); k++) AddToDigest(d, s.markers[k]);
   for (const ElementData &e : s.elements) {
     d.text(e.type);
     d.integer(e.i.id);
@@ -248,6 +251,79 @@ PetscErrorCode ReadKept(Runtime &R, const double *x)
   PetscCall(ResumeOutput(R, x + 2));
   R.step_parameters = R.start_parameters = ParametersNow(R.scene);
   if (x[checkpoint_numbers - 1] != 0) R.step_parameters.clear(); /* a parameter had been changed between the last step and the checkpoint */
+  PetscFunctionReturn(0);
+}
+
+namespace
+{
+
+/* A queried angle in a checkpoint. The run that reads it may have other markers of these numbers, if they were made after the set-up. */
+struct AngleNumbers {
+  double i, j, angle, turned, markers[2]; /* markers: digest of both */
+};
+
+AngleNumbers NumbersOf(const SceneData &s, const CountedAngle &c)
+{
+  AngleNumbers x = {(double)c.i, (double)c.j, c.angle, c.turned, {0, 0}};
+  Digest       d;
+  for (PetscInt id : {c.i, c.j}) AddToDigest(d, s.markers[id]);
+  d.put(x.markers);
+  return x;
+}
+
+constexpr std::size_t angle_size = sizeof(AngleNumbers) / sizeof(double);
+
+void WriteNumbers(const Runtime &R, std::vector<double> *x)
+{
+  x->push_back((double)R.queried_angles.size());
+  for (const CountedAngle &c : R.queried_angles) {
+    const AngleNumbers  n     = NumbersOf(R.scene, c);
+    const double *const first = reinterpret_cast<const double *>(&n);
+    x->insert(x->end(), first, first + angle_size);
+  }
+  x->insert(x->end(), R.notes.begin(), R.notes.end());
+}
+
+/* All that the run has counted itself belongs to another state */
+void ReadNumbers(Runtime &R, const std::vector<double> &x)
+{
+  R.queried_angles.clear();
+  R.accepted_states++;
+  R.turns_unknown = true;
+  const double *at = x.data() + 1;
+  for (int k = 0; k < (int)x[0]; k++, at += angle_size) {
+    AngleNumbers n;
+    std::memcpy(&n, at, sizeof n);
+    const CountedAngle c{(PetscInt)n.i, (PetscInt)n.j, n.angle, n.turned};
+    if (std::max(c.i, c.j) >= (PetscInt)R.scene.markers.size()) continue;
+    const AngleNumbers mine = NumbersOf(R.scene, c);
+    if (std::equal(mine.markers, mine.markers + 2, n.markers)) R.queried_angles.push_back(c);
+  }
+  R.notes.assign(at, x.data() + x.size());
+}
+
+PetscErrorCode CheckpointNumbers(TS ts, PetscBool reading, std::vector<double> *x)
+{
+  PetscFunctionBegin;
+  if (reading) ReadNumbers(*RunOf(ts), *x);
+  else WriteNumbers(*RunOf(ts), x);
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode Notes(TS ts, std::vector<double> **notes)
+{
+  PetscFunctionBegin;
+  *notes = &RunOf(ts)->notes;
+  PetscFunctionReturn(0);
+}
+
+} // namespace
+
+PetscErrorCode KeepNumbers(TS ts)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectComposeFunction((PetscObject)ts, "TSHHT3CheckpointNumbers_C", CheckpointNumbers));
+  PetscCall(PetscObjectComposeFunction((PetscObject)ts, "HHTSceneNotes_C", Notes));
   PetscFunctionReturn(0);
 }
 

@@ -71,12 +71,26 @@ PetscErrorCode Snapshot::Work::ofMarkers(const Measure &m, double *x)
   PetscFunctionReturn(0);
 }
 
+/* Once after a checkpoint was read */
+static PetscErrorCode TellOfUnknownTurns(Runtime &R, PetscInt i, PetscInt j)
+{
+  PetscFunctionBegin;
+  if (!R.turns_unknown) PetscFunctionReturn(0);
+  R.turns_unknown = false;
+  PetscCall(PetscPrintf(R.scene.comm,
+                        "scene: before the checkpoint nobody has counted the full turns of the angle between %s and %s: it is now in (-pi, pi], and counted from here on. "
+                        "Make a channel of it in both runs\n",
+                        R.scene.bodyName(R.scene.markers[i].body).c_str(), R.scene.bodyName(R.scene.markers[j].body).c_str()));
+  PetscFunctionReturn(0);
+}
+
 /* The run counts the full turns of an angle from the first query of the angle on */
 PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
 {
   const auto                same = [&](const CountedAngle &c) { return c.i == i && c.j == j; };
   const auto                mine = std::find_if(origin.counted.begin(), origin.counted.end(), same);
   std::vector<CountedAngle> now(1);
+  bool                      turns_known;
   PetscFunctionBegin;
   PetscCall(hasBody(scene().markers[i].body));
   PetscCall(hasBody(scene().markers[j].body));
@@ -85,8 +99,9 @@ PetscErrorCode Snapshot::Work::angle(PetscInt i, PetscInt j, double *x)
     now[0] = *mine;
   } else {
     const CountFrom then(*R, origin);
-    PetscCall(FirstAngle(*R, u.data(), t, i, j, &now[0]));
-    const bool here = origin.accepted_states == R->accepted_states; /* false if the run has made steps since the state was stored */
+    PetscCall(FirstAngle(*R, u.data(), t, i, j, &now[0], &turns_known));
+    const bool here = origin.accepted_states == R->accepted_states; /* false if the run has made steps, or was moved to a checkpoint, since the state was stored */
+    if (here && !turns_known) PetscCall(TellOfUnknownTurns(*R, i, j));
     if (here && std::none_of(R->queried_angles.begin(), R->queried_angles.end(), same)) R->queried_angles.push_back(now[0]);
     origin.counted.push_back(now[0]);
   }

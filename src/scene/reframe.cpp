@@ -431,6 +431,7 @@ PetscErrorCode AttachReframing(Runtime &R, TS ts)
   PetscCall(ISDestroy(&is));
   PetscCall(TSHHT3SetCheckpointVec(ts, R.axes));
   PetscCall(PetscObjectComposeFunction((PetscObject)ts, "TSHHT3CheckpointPrepare_C", PrepareCheckpoint));
+  PetscCall(KeepNumbers(ts));
   PetscFunctionReturn(0);
 }
 

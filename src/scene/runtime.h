@@ -73,7 +73,10 @@ struct Runtime {
 
   std::map<std::pair<const StoreBase *, PetscInt>, std::unique_ptr<Probe>> readers; /* probes of queried parts of elements, ReaderOf() */
   std::vector<CountedAngle>                                                queried_angles;
-  long                                                                     accepted_states = 0;  /* number of accepted states so far */
+  bool                                                                     turns_unknown   = false; /* after a checkpoint was read, until it was said that an angle has turns that nobody had counted */
+  /* numbers of the program that steers the run, such as the signs of its events: checkpoints have them. "HHTSceneNotes_C" gives it this list. */
+  std::vector<double>                                                      notes;
+  long                                                                     accepted_states = 0;  /* number of accepted states and read checkpoints so far */
   /* number of the last step that a TS of another type than TSHHT3 has completed, FollowAcceptedSteps() in ts.cpp */
   PetscInt                                                                 followed_steps  = 0;
   long                                                                     accepted_move   = -1; /* value of Bodies::moves when the bodies were moved to the last accepted state; -1: never, or axes may have changed since */
@@ -130,11 +133,11 @@ PetscErrorCode AngleTolerances(Runtime &R, TS ts);
 /* counted_angles.cpp, collective. CountAngles() updates the angles to the state to which the bodies were last moved; u:
    this rank's unknowns in that state. FirstAngle(): an angle that is queried for the first time. It has the full turns
    that a spring, a motion or a channel counts for the same markers; without these, in a planar scene, the full turns
-   since the start; else it is in (-pi, pi]. */
+   since the start; else it is in (-pi, pi], and its full turns are unknown unless the run is at its start. */
 PetscErrorCode CountAngles(const Runtime &R, const double *u, std::vector<CountedAngle> &all);
 /* the angle after assembly and equilibrium, which differs by less than half a turn from the described one in (-pi, pi] */
 double         StartAngle(const Model &M, Marker i, Marker j);
-PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first);
+PetscErrorCode FirstAngle(const Runtime &R, const double *u, double t, PetscInt i, PetscInt j, CountedAngle *first, bool *turns_known);
 /* copies queried angles and full turns from a run in state U, V to the run `to`, in state X, Y, that continues it */
 PetscErrorCode CarryAngles(Runtime &from, Vec U, Vec V, Runtime &to, Vec X, Vec Y);
 /* reframe.cpp: moves all bodies on this rank, including copies of other ranks' bodies, to the state (U, V) */
@@ -147,6 +150,7 @@ constexpr PetscInt checkpoint_numbers = 72;
 PetscInt           Kept(const Runtime &R);
 PetscErrorCode     WriteKept(Runtime &R);                 /* before a checkpoint is written */
 PetscErrorCode     ReadKept(Runtime &R, const double *x); /* after one was read */
+PetscErrorCode     KeepNumbers(TS ts);                    /* lets checkpoints have the queried angles and Runtime::notes */
 /* step_limit.cpp: upper bounds on the step size, so that no contact is tunnelled through and no full turn of an angle is lost */
 PetscErrorCode AttachStepLimit(Runtime &R, TS ts);
 /* expressions.cpp: variables, states, user's forces */

@@ -86,13 +86,22 @@ PetscErrorCode TransferVectors(TS ts, Archive &a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Numbers of the application whose count changes during the run, unlike that of its vector: a function composed with the TS appends them, or takes those of the file over */
+PetscErrorCode NumbersOfApplication(TS ts, PetscBool reading, std::vector<double> *numbers)
+{
+  PetscFunctionBegin;
+  PetscTryMethod(ts, "TSHHT3CheckpointNumbers_C", (TS, PetscBool, std::vector<double> *), (ts, reading, numbers));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* This rank's part of the file */
 PetscErrorCode GatherRun(TS ts, Archive &a)
 {
-  Identity          id;
-  std::string       options;
-  std::vector<char> words;
-  WorkVec           probe;
+  Identity            id;
+  std::string         options;
+  std::vector<char>   words;
+  std::vector<double> numbers;
+  WorkVec             probe;
 
   PetscFunctionBegin;
   PetscCall(IdentifyRun(ts, &id));
@@ -100,10 +109,12 @@ PetscErrorCode GatherRun(TS ts, Archive &a)
   words.assign(options.begin(), options.end());
   PetscCall(probe.like(ts->vec_sol));
   PetscCall(TellingResidual(ts, probe));
+  PetscCall(NumbersOfApplication(ts, PETSC_FALSE, &numbers));
   a.plain(id);
   a.list(words);
   TransferStructs(ts, a);
   PetscCall(TransferVectors(ts, a));
+  a.list(numbers);
   Vec of_it = probe;
   PetscCall(TransferVec(ts, a, &of_it));
   PetscCall(SaveMatrices(ts, a));
@@ -123,11 +134,12 @@ PetscErrorCode CheckBuild(TS ts, const char file[], const Archive &a)
 
 PetscErrorCode RestoreRun(TS ts, const char file[], Archive &a)
 {
-  Integrator       &I    = Get(ts);
-  Identity          id;
-  std::string       options;
-  std::vector<char> words;
-  WorkVec           was, is;
+  Integrator         &I    = Get(ts);
+  Identity            id;
+  std::string         options;
+  std::vector<char>   words;
+  std::vector<double> numbers;
+  WorkVec             was, is;
 
   PetscFunctionBegin;
   a.plain(id);
@@ -139,11 +151,13 @@ PetscErrorCode RestoreRun(TS ts, const char file[], Archive &a)
   PetscCall(was.like(ts->vec_sol));
   PetscCall(is.like(ts->vec_sol));
   PetscCall(TransferVectors(ts, a));
+  a.list(numbers);
   Vec of_file = was;
   PetscCall(TransferVec(ts, a, &of_file));
   PetscCall(CheckBuild(ts, file, a));
   I.stage_id = 0;
   PetscCall(CommitChange(ts)); /* the application takes over its coordinates, before anything is evaluated in them */
+  PetscCall(NumbersOfApplication(ts, PETSC_TRUE, &numbers));
   PetscCall(OptionsInWords(ts, &options));
   const std::string theirs(words.begin(), words.end());
   if (theirs != options) /* allowed, but the run will not repeat the steps of the other one */
