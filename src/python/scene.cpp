@@ -145,6 +145,16 @@ py::array Sample(Scene &s, py::object ts, double t)
   return FromDoubles(x.data(), {(py::ssize_t)x.size()});
 }
 
+/* Numbers of the Python part in the checkpoints of a run of a scene */
+std::vector<double> &NotesOf(py::object ts)
+{
+  std::vector<double> *notes = nullptr;
+  PetscErrorCode (*get)(TS, std::vector<double> **);
+  Check(PetscObjectQueryFunction((PetscObject)ToTS(ts), "HHTSceneNotes_C", &get));
+  Check(get(ToTS(ts), &notes));
+  return *notes;
+}
+
 void SetStart(Scene &s, const std::string &assembly, const std::string &redundant, const std::string &rotations, bool equilibrium, bool view, double tolerance,
               double time, double angle_tol)
 {
@@ -196,6 +206,16 @@ void BindScene(py::module_ &m)
     py::dict all;
     for (const auto &k : AllKinds()) all[k.first.c_str()] = k.second.defaults();
     return all;
+  });
+  m.def("notes", [](py::object ts) {
+    py::list all;
+    for (double x : NotesOf(ts)) all.append(x);
+    return all;
+  });
+  m.def("set_notes", [](py::object ts, py::list all) {
+    std::vector<double> &notes = NotesOf(ts);
+    notes.clear();
+    for (py::handle x : all) notes.push_back(x.cast<double>());
   });
   py::class_<ModalBody, std::shared_ptr<ModalBody>>(m, "ModalBody")
     .def_readonly("name", &ModalBody::name)

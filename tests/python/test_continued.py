@@ -97,5 +97,115 @@ class Angles(Folder):
             self.assertAlmostEqual(run.solve(3.).snapshot().value(angle), first + 10., delta=1e-5)
 
 
+class Events(Folder):
+    levels = (.3, .6, .9, 1.2, 1.5)
+
+    def test_back_to_an_earlier_time(self):
+        scene, angle, _ = wheel()
+        run, hits = scene.run(tolerance=1e-6), []
+        run.event(h.sin(angle) - .5, lambda r: hits.append(r.time), direction=1)
+        run.solve(.3).save(self.file)
+        run.solve(2.)
+        self.assertEqual(len(hits), 4)
+        first = hits[1:]
+        hits.clear()
+        run.load(self.file).solve(2.)
+        self.assertEqual(hits, first)
+
+    def passages(self, terminal, save, log):
+        scene, angle, _ = double_pendulum()
+        run = scene.run(tolerance=1e-6)
+        for level in self.levels:
+            def action(r, level=level):
+                log.append((level, r.time))
+                if save and not terminal:
+                    r.save(self.file + "%g" % level)
+            run.event(angle + level, action, terminal=terminal)
+        return run
+
+    def test_checkpoints_of_actions(self):
+        log = []
+        whole = self.passages(False, True, log).solve(1.)
+        self.assertEqual([level for level, _ in log], list(self.levels))
+        for k, level in enumerate(self.levels):
+            mine = []
+            run = self.passages(False, False, mine).load(self.file + "%g" % level).solve(1.)
+            self.assertEqual(mine, log[k + 1:])
+            self.assertEqual(run["angle"][-1], whole["angle"][-1])
+
+    def test_checkpoints_of_ends(self):
+        log = []
+        run = self.passages(True, True, log)
+        for level in self.levels:
+            run.solve(1.).save(self.file + "%g" % level)
+        self.assertEqual([level for level, _ in log], list(self.levels))
+        for k, level in enumerate(self.levels[:-1]):
+            mine = []
+            self.passages(True, False, mine).load(self.file + "%g" % level).solve(1.)
+            self.assertEqual(mine, log[k + 1:k + 2])
+
+    def test_of_other_runs(self):
+        """An event that the other run had not is a new one, though it has the same number"""
+        scene = h.Scene(gravity=(0, 0, -G))
+        ball = scene.add("ball", h.PointMass(position=(0, 0, 1.)))
+        z = h.displacement(ball.marker(), 2)
+        run = scene.run(tolerance=1e-6)
+        run.event(z - .5, terminal=True)
+        run.solve(1.).save(self.file)
+        run, hits = scene.run(tolerance=1e-6), []
+        run.event(z - (.5 - 1e-4), lambda r: hits.append(r.time))
+        run.load(self.file).solve(.4)
+        np.testing.assert_allclose(hits, [np.sqrt(2 * (.5 + 1e-4) / G)], atol=1e-6)
+
+    def test_not_again(self):
+        """run(after=) projects the positions, which may move back what has ended the run before"""
+        for change in (0., .1):
+            for level in np.linspace(.1, 1.5, 15):
+                scene, angle, load = double_pendulum()
+                run, hits = scene.run(tolerance=1e-6), []
+                run.event(angle + level, terminal=True, direction=-1)
+                run.solve(1.)
+                load.set(change)
+                on = scene.run(tolerance=1e-6, after=run)
+                on.event(angle + level, lambda r: hits.append(r.time), direction=-1)
+                on.solve(run.time + .05)
+                self.assertEqual(hits, [], (change, level))
+
+    def test_again_after_a_change(self):
+        """A parameter raises an acceleration, which then falls through zero again"""
+        for more in (1e-1, 1e-3, 1e-5):
+            scene = h.Scene()
+            p = scene.parameter("p", 0.2)
+            m = scene.add("b", h.PointMass()).marker()
+            scene.add("f", h.UserForce(m, force=[p - h.time(), 0, 0]))
+            run, end = scene.run(tolerance=1e-6), h.acceleration(m, 0)
+            run.event(end, terminal=True, direction=-1)
+            run.solve(1.)
+            p.set(.2 + more)
+            run = scene.run(tolerance=1e-6, after=run)
+            run.event(end, terminal=True, direction=-1)
+            run.solve(1.)
+            self.assertAlmostEqual(run.time, .2 + more, delta=1e-6 * more + 1e-12)
+
+    def test_again_elsewhere(self):
+        """A parameter moves the bodies to where the event is still to come"""
+        scene = h.Scene(gravity=(0, 0, -G))
+        up = scene.parameter("up", 0.)
+        ball = scene.add("ball", h.PointMass(position=(0, 0, 1.)))
+        lift = scene.add("lift", h.PointMass())
+        scene.add("raised", h.TranslationalMotion(lift.marker(), scene.ground.marker(), up))
+        scene.add("x", h.InLine(lift.marker(), scene.ground.marker()))
+        height = h.displacement(ball.marker(), 2) + h.displacement(lift.marker(), 2)
+        run, hits = scene.run(tolerance=1e-7), []
+        run.event(height - .5, terminal=True)
+        run.solve(1.)
+        up.set(.1)
+        scene.start(assembly="project")
+        run = scene.run(tolerance=1e-7, after=run)
+        run.event(height - .5, lambda r: hits.append(r.time))
+        run.solve(.4)
+        np.testing.assert_allclose(hits, [np.sqrt(2 * .6 / G)], atol=1e-5)
+
+
 if __name__ == "__main__":
     unittest.main()

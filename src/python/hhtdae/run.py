@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from . import _core, integrator
 from ._errors import Error
-from .events import Signs
+from .events import Signs, identity, of_positions
 from .expressions import CONDITIONS, _expression
 from .ranks import together
 from .query import Linearization, Snapshot
@@ -126,7 +126,8 @@ class Run(Channels):
             tolerance = positive(tolerance, "tolerance")
         self._options, self._events, self._signs, self._passed = dict(options or {}), [], Signs(), []
         self._now = None  # a snapshot with which formulas of events are evaluated
-        self._before, self._numbers = None, None  # state, and parameters, at the last event before its actions
+        self._before, self._numbers = None, None  # state, and parameters, at the last event before its actions, or where the run was continued
+        self._resumed = None  # numbers of _keep_signs() of the run that this one continues, until it goes on
         self._ended = False  # whether a terminal event has ended the last solve()
         self._serial = 0  # number of calls of TSSolve(); each calls monitors with its initial state first
         self._solving = False  # whether solve() is running: its callbacks must neither solve nor close the run
@@ -144,6 +145,12 @@ class Run(Channels):
             else:
                 _core.attach_signals(self.ts)
             _core.set_from_options(self.ts)
+        if after is not None and after._events:
+            self._resumed = [0.] + after._signs.numbers()
+            if after._changed():
+                self._resumed = [0.] + after._signs.numbers(lambda k: of_positions(after._events[k][0]))
+                self._signs.within = Signs.largest_return
+            self._note_state()
 
     def _open(self):
         if not self.ts:  # the TS may also have been destroyed by the user
@@ -217,7 +224,8 @@ class Run(Channels):
         formula : Expression
             A measure, or a formula of measures; a condition such as ``x < 0.3`` passes upwards when it becomes true. Full turns of an `angle`
             that no element and no channel reads between the same two markers are counted from the time of this call on or later: make a channel
-            of it.
+            of it. By its formula and direction an event is recognized in a run that continues this one, by `load` or ``Scene.run(after=)``: it
+            does not find again what has been found.
         action : callable, optional
             action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``. If it changes the
             behaviour of a callback, it has to call `restart`.
@@ -235,7 +243,7 @@ class Run(Channels):
             formula = formula - 0.5
         check_parameters(ordered([formula]), self.scene, "event()")
         self._events.append((formula, action, terminal))
-        self._signs.add(direction)
+        self._signs.add(direction, identity(formula, direction))
         if len(self._events) == 1:
             self._now = Snapshot(self, later=True)
             self._open().setPostStep(_look_of(weakref.ref(self)))
@@ -253,6 +261,7 @@ class Run(Channels):
         """Called after a step, before the monitors: if a formula passes zero, the TS is moved back to the first passage, and TSSolve() ends. So
         outputs have a step that ends there."""
         self._passed = self._signs.passed(ts.getPrevTime(), ts.getTime(), self._event_value)
+        self._keep_signs(False)
         if self._passed:
             integrator.move_back(ts, self._passed[0][0])
             ts.setConvergedReason(PETSc.TS.ConvergedReason.CONVERGED_USER)
@@ -274,12 +283,30 @@ class Run(Channels):
             return True
         return not all([x.equal(y) for x, y in zip(self._open().getSolution2(), self._before)])
 
+    def _keep_signs(self, changed):
+        """Gives the run what its checkpoints have to know of events: whether state or parameters have changed since the last one, and `Signs`"""
+        _core.set_notes(self._open(), [float(changed)] + self._signs.numbers())
+
+    def _resume_events(self):
+        """Takes over what another run knew of the events that have been added meanwhile"""
+        if self._resumed is None:
+            return
+        changed, *numbers = self._resumed or [1.]
+        self._resumed = None
+        self._signs.resume(numbers)
+        if changed:
+            self._numbers = None
+
     def _solve_to_events(self):
         """Solves from event to event; the first event may be added by a callback during the solve"""
+        self._resume_events()
         while True:
             ts = self._open()  # an action may have destroyed it
-            if self._events and self._changed():
-                self._signs.changed()
+            if self._events:
+                changed = self._changed()
+                if changed:
+                    self._signs.changed()
+                self._keep_signs(changed)
             self._passed = []
             self._serial += 1
             self.scene._core.solve(ts)
@@ -437,6 +464,9 @@ class Run(Channels):
     @one_thread
     def save(self, file: str) -> None:
         """Writes a checkpoint, from which the run can be resumed with bitwise identical results. Collective."""
+        if self._events:
+            self._resume_events()
+            self._keep_signs(self._changed())
         integrator.checkpoint_save(self._open(), file)
 
     @one_thread
@@ -444,7 +474,9 @@ class Run(Channels):
         """Moves the run to the state in a checkpoint of a run of the same scene, from where it continues with bitwise identical results; returns
         the run. Collective.
 
-        Parameters must have the values with which the checkpoint was written; afterwards `Scene.set` may change them.
+        Parameters must have the values with which the checkpoint was written; afterwards `Scene.set` may change them. The checkpoint knows full turns
+        of all angles that its run had read, and which events it had found; a new run adds them before it goes on. To load what a run made with ``after=``
+        has saved, give parameters its values; if the described initial values do not satisfy them, ``scene.start(assembly="off")`` before the run is made.
         """
         ts = self._open()
         self._not_solving("load")
@@ -452,6 +484,8 @@ class Run(Channels):
             _core.set_up(ts)  # before the set-up, checkpoint_load() would only store the name of the file
             integrator.checkpoint_load(ts, file)
             self._project_restarts()
+        self._resumed, self._signs.within, self._passed = _core.notes(ts), np.inf, []
+        self._note_state()
         if self._recorder:
             self._recorder.resume(self.time)
         return self
