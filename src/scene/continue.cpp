@@ -13,6 +13,8 @@ namespace hhtdae
 namespace
 {
 
+constexpr double time_difference = 1e-6; /* units of time, or part of the time: over it motions show whether they move */
+
 /* Whether two descriptions have the same coordinates, variables and states */
 bool SameUnknowns(const SceneData &a, const SceneData &b)
 {
@@ -194,6 +196,17 @@ std::vector<double> ParametersNow(const SceneData &s)
   return x;
 }
 
+PetscErrorCode ParametersAt(const Runtime &R, TS ts, PetscReal t, std::vector<double> *values)
+{
+  PetscReal now;
+  PetscInt  steps;
+  PetscFunctionBegin;
+  PetscCall(TSGetTime(ts, &now));
+  PetscCall(TSGetStepNumber(ts, &steps));
+  *values = steps && t != now && !R.step_parameters.empty() ? R.step_parameters : ParametersNow(R.scene);
+  PetscFunctionReturn(0);
+}
+
 PetscErrorCode KeepStart(TS ts, Vec A)
 {
   Runtime &R = *RunOf(ts);
@@ -247,13 +260,71 @@ PetscErrorCode ParametersChanged(const Runtime &R, const std::vector<double> &be
   PetscFunctionReturn(0);
 }
 
-PetscErrorCode PresentState(TS ts, Vec state[3], PetscBool *done)
+/* Rows of the constraints at the present state, then a little later, from which their rates follow. Others are zero. */
+PetscErrorCode RowsOfConstraints(Runtime &R, TS ts, const std::vector<double> &parameters, std::vector<double> *rows)
+{
+  PetscReal            t;
+  Vec                  U, V, F, part;
+  const double        *x;
+  PetscInt             n;
+  const WithParameters then(R.scene, parameters);
+  PetscFunctionBegin;
+  PetscCall(TSGetTime(ts, &t));
+  PetscCall(TS2GetSolution(ts, &U, &V));
+  PetscCall(VecDuplicate(U, &F));
+  for (double later : {0., time_difference * std::max(1., std::abs(t))}) {
+    PetscCall(Residual(R, t + later, U, V, V, F));
+    for (TSHHT3Role role : {TSHHT3_HOLONOMIC, TSHHT3_NONHOLONOMIC}) {
+      PetscCall(VecGetSubVector(F, R.roles[role], &part));
+      PetscCall(VecGetLocalSize(part, &n));
+      PetscCall(VecGetArrayRead(part, &x));
+      rows->insert(rows->end(), x, x + n);
+      PetscCall(VecRestoreArrayRead(part, &x));
+      PetscCall(VecRestoreSubVector(F, R.roles[role], &part));
+    }
+  }
+  PetscCall(VecDestroy(&F));
+  PetscFunctionReturn(0);
+}
+
+/* Whether parameters have changed what constraints prescribe, and the run goes on from the nearest state that they allow: velocities in any start but with `off`, positions with `project` */
+PetscErrorCode StartWillProject(Runtime &R, TS ts, PetscBool *project)
+{
+  TSHHT3Start         start;
+  std::vector<double> before, now;
+  PetscErrorCode (*get)(TS, TSHHT3Start *);
+  PetscFunctionBegin;
+  *project = PETSC_FALSE;
+  PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3GetStart_C", &get));
+  PetscCall(get(ts, &start));
+  if (start == TSHHT3_START_OFF) PetscFunctionReturn(0);
+  PetscCall(RowsOfConstraints(R, ts, R.step_parameters, &before));
+  PetscCall(RowsOfConstraints(R, ts, {}, &now));
+  PetscInt positions;
+  PetscCall(ISGetLocalSize(R.roles[TSHHT3_HOLONOMIC], &positions));
+  const bool moved    = !std::equal(now.begin(), now.begin() + positions, before.begin());
+  PetscMPIInt found[2] = {moved, now != before};
+  if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, found, 2, MPI_INT, MPI_MAX, R.scene.comm));
+  *project = found[1] && (!found[0] || start == TSHHT3_START_PROJECT) ? PETSC_TRUE : PETSC_FALSE;
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode PresentState(TS ts, Vec state[3], PetscBool *done, TS *copy)
 {
   Runtime  &R = *RunOf(ts);
-  PetscBool changed;
+  PetscReal t;
+  PetscBool changed, project = PETSC_FALSE;
   PetscErrorCode (*evaluate)(TS, PetscBool, Vec, Vec, Vec, PetscBool *);
   PetscFunctionBegin;
   PetscCall(ParametersChanged(R, R.step_parameters, &changed));
+  if (changed && !R.step_parameters.empty()) PetscCall(StartWillProject(R, ts, &project));
+  if (project) {
+    PetscCall(TSGetTime(ts, &t));
+    PetscCall(BeginCopy(ts, TSHHT3_START_PROJECT, copy));
+    PetscCall(TSHHT3EvaluateAt(*copy, t, state[0], state[1], state[2]));
+    *done = PETSC_TRUE;
+    PetscFunctionReturn(0);
+  }
   PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3EvaluatePresent_C", &evaluate));
   PetscCall(evaluate(ts, changed, state[0], state[1], state[2], done));
   PetscFunctionReturn(0);
@@ -316,7 +387,10 @@ PetscErrorCode StateAt(TS ts, PetscReal t, bool from_equations, Vec state[3], TS
     PetscCall(StateOfStart(ts, t, state, copy));
     PetscFunctionReturn(0);
   }
-  if (t == now) PetscCall(PresentState(ts, state, &done));
+  if (t == now) PetscCall(PresentState(ts, state, &done, copy));
+  std::vector<double> parameters;
+  PetscCall(ParametersAt(*RunOf(ts), ts, t, &parameters));
+  const WithParameters then(RunOf(ts)->scene, parameters);
   if (!done) PetscCall((from_equations ? TSHHT3EvaluateAt : TSHHT3Interpolate)(ts, t, state[0], state[1], state[2]));
   PetscFunctionReturn(0);
 }
@@ -360,7 +434,6 @@ PetscErrorCode ToNearestConsistent(TS ts)
 /* Whether motions move bodies at t: constraints at velocity level are violated at rest, or holonomic constraints change within a short time */
 static PetscErrorCode HasMovingMotions(Runtime &R, double t, Vec U, Vec V, PetscBool *moving)
 {
-  const double time_difference = 1e-6 * std::max(1., std::abs(t));
   Vec          now, later, rows;
   double       largest;
   PetscFunctionBegin;
@@ -368,7 +441,7 @@ static PetscErrorCode HasMovingMotions(Runtime &R, double t, Vec U, Vec V, Petsc
   PetscCall(VecDuplicate(U, &now));
   PetscCall(VecDuplicate(U, &later));
   PetscCall(Residual(R, t, U, V, V, now));
-  PetscCall(Residual(R, t + time_difference, U, V, V, later));
+  PetscCall(Residual(R, t + time_difference * std::max(1., std::abs(t)), U, V, V, later));
   PetscCall(VecAXPY(later, -1, now));
   for (const auto &[role, F] : {std::pair(TSHHT3_HOLONOMIC, later), std::pair(TSHHT3_NONHOLONOMIC, now)}) {
     PetscCall(VecGetSubVector(F, R.roles[role], &rows));

@@ -308,8 +308,11 @@ PetscErrorCode Linearization::take(TS ts, PetscReal t, Body axes)
   PetscCall(TS2GetSolution(ts, &U, &V));
   for (Vec &x : w.state) PetscCall(VecDuplicate(U, &x));
   PetscCall(StateAt(ts, t, true, w.state, &w.start));
+  std::vector<double> parameters;
+  PetscCall(ParametersAt(*w.R, ts, t, &parameters));
   if (w.start) w.R = RunOf(w.start);
   w.origin.take(*w.R);
+  w.origin.parameters = parameters;
   w.t    = t;
   w.size = SceneSize(w.R->scene);
   if (!(w.size > 0)) w.size = 1;

@@ -113,6 +113,7 @@ PetscErrorCode Snapshot::take(TS ts, PetscReal t)
   for (Vec &x : W) PetscCall(VecDuplicate(U, &x));
   PetscErrorCode failed = StateAt(ts, t, true, W, &copy);
   if (!failed) failed = take(*w.R, t, W);
+  if (!failed) failed = ParametersAt(*w.R, ts, t, &w.origin.parameters);
   /* a copy that has made the first step has other reference attitudes than the run */
   for (std::size_t b = 0; copy && !failed && b < w.origin.references.size(); b++) w.origin.references[b] = RunOf(copy)->bodies.body[b].C;
   PetscCall(TSDestroy(&copy));

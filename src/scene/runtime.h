@@ -184,11 +184,37 @@ PetscErrorCode KeepStart(TS ts, Vec A);    /* stores the solution, with its mult
    copy: the run by BeginCopy() that was made to compute them, null if none was needed */
 PetscErrorCode StateOfStart(TS ts, PetscReal t, Vec state[3], TS *copy);
 std::vector<double> ParametersNow(const SceneData &s); /* present values of all parameters */
+/* Values of the parameters that belong to the state of a run at t: within the last step those of this step, at its end the present ones */
+PetscErrorCode ParametersAt(const Runtime &R, TS ts, PetscReal t, std::vector<double> *values);
+
+/* During the lifetime of this object the scene's parameters have other values; their present ones if `values` is empty */
+class WithParameters
+{
+public:
+  WithParameters(const SceneData &s, const std::vector<double> &values) : scene_(s)
+  {
+    if (values.empty()) return;
+    now_ = ParametersNow(s);
+    put(values);
+  }
+  ~WithParameters() { put(now_); }
+  WithParameters(const WithParameters &) = delete;
+
+private:
+  const SceneData    &scene_;
+  std::vector<double> now_;
+  void                put(const std::vector<double> &values)
+  {
+    for (std::size_t k = 0; k < values.size(); k++) *scene_.parameters[k].present = values[k];
+  }
+};
+
 /* u, u', u'' of a run at t. Before the first step: the state of the start. Later: a state within the last step, whose
-   accelerations and multipliers satisfy the equations (from_equations) or are interpolated. If parameters or the solution
-   have been changed since the last step, or a restart is due, the state at the present time is that of a start from
-   there. With TS types other than hhtdae only the end of the last step is available, without accelerations. copy: as in
-   StateOfStart() */
+   accelerations and multipliers satisfy the equations (from_equations) or are interpolated, with the parameters of that
+   step. If parameters or the solution have been changed since the last step, or a restart is due, the state at the present
+   time is that of a start from there; positions and velocities are the given ones, unless a parameter has changed what
+   constraints prescribe: then it is read from a copy, whose start has projected them. With TS types other than hhtdae only
+   the end of the last step is available, without accelerations. copy: as in StateOfStart() */
 PetscErrorCode StateAt(TS ts, PetscReal t, bool from_equations, Vec state[3], TS *copy);
 
 } // namespace hhtdae

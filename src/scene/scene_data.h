@@ -134,9 +134,9 @@ struct StartResult {
 
 /* described: the value with which elements were described; present: the value that functions read during a run. Checkpoints store both. */
 struct ParameterData {
-  std::string                   name;
-  std::shared_ptr<const double> present;
-  double                        described;
+  std::string             name;
+  std::shared_ptr<double> present;
+  double                  described;
 };
 
 struct SceneData {

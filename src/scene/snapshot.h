@@ -10,17 +10,19 @@
 namespace hhtdae
 {
 
-/* The data that a state needs besides its unknowns: reference attitudes of rotations, memories of elements, and angles
-   over full turns. The run itself replaces its own with every accepted step. */
+/* The data that a state needs besides its unknowns: reference attitudes of rotations, memories of elements, angles
+   over full turns, and values of parameters. The run itself replaces its own with every accepted step. */
 struct Origin {
   std::vector<Matrix3>      references; /* LocalBody::C of all bodies on this rank */
   std::vector<double>       memories;   /* of all batches; empty if no element has memory */
   std::vector<CountedAngle> counted;
+  std::vector<double>       parameters;
   long                      accepted_states = 0; /* Runtime::accepted_states when the data were stored */
 
   void take(Runtime &R)
   {
     counted         = R.queried_angles;
+    parameters      = ParametersNow(R.scene);
     accepted_states = R.accepted_states;
     references.clear();
     for (const LocalBody &b : R.bodies.body) references.push_back(b.C);
@@ -29,11 +31,11 @@ struct Origin {
   }
 };
 
-/* During the lifetime of this object the run has the references and memories of an Origin */
+/* During the lifetime of this object the run has the references and memories, and the scene the parameters, of an Origin */
 class CountFrom
 {
 public:
-  CountFrom(Runtime &R, Origin &o) : R_(R), origin_(o), now_(o.memories.size())
+  CountFrom(Runtime &R, Origin &o) : R_(R), origin_(o), now_(o.memories.size()), parameters_(R.scene, o.parameters)
   {
     if (!now_.empty()) CopyMemories(R_, now_.data(), false);
     exchange();
@@ -50,6 +52,7 @@ private:
   Runtime            &R_;
   Origin             &origin_;
   std::vector<double> now_; /* memories of the run, restored by the destructor */
+  WithParameters      parameters_;
 
   void exchange()
   {

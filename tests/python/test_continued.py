@@ -207,5 +207,59 @@ class Events(Folder):
         np.testing.assert_allclose(hits, [np.sqrt(2 * .6 / G)], atol=1e-5)
 
 
+class Parameters(unittest.TestCase):
+    def driven(self, **motion):
+        """A rod that a motion turns about its end; its speed, and the force on the bearing"""
+        scene = h.Scene()
+        p = scene.parameter("p", 1.)
+        rod = scene.rigid_body("rod", mass=1, inertia=(.1, .1, .1), position=(.5, 0, 0))
+        i, j = rod.marker((-.5, 0, 0)), scene.ground.marker()
+        bearing = scene.add("bearing", h.Revolute(i, j))
+        scene.add("drive", h.RotationalMotion(i, j, motion["law"](p), of=motion.get("of", "displacement")))
+        scene.channel("speed", h.angular_velocity(i, "z"))
+        scene.channel("force", h.joint_force(bearing, "x", frame=i))
+        scene.start(assembly="project")
+        return scene, p, h.angular_velocity(i, "z"), h.joint_force(bearing, "x", frame=i)
+
+    def test_velocities_that_motions_prescribe(self):
+        """They jump with the parameter, and with them what is read at the present time"""
+        for motion in (dict(law=lambda p: p, of="velocity"), dict(law=lambda p: p * (h.time() - .5))):
+            scene, p, speed, force = self.driven(**motion)
+            run = scene.run(tolerance=1e-7).solve(.5)
+            self.assertAlmostEqual(run.snapshot().value(force), -.5, delta=1e-3)
+            p.set(10.)
+            now = run.snapshot()
+            for value, sample in ((now.value(speed), run.sample()["speed"]), (now.value(force), run.sample()["force"])):
+                self.assertEqual(value, sample)
+            self.assertAlmostEqual(now.value(speed), 10., delta=1e-6)
+            self.assertAlmostEqual(now.value(force), -50., delta=1e-2)
+            run.solve(run.time + 1e-7)
+            self.assertAlmostEqual(run.sample()["speed"], 10., delta=1e-6)
+            self.assertAlmostEqual(run.sample()["force"], -50., delta=.1)
+
+    def test_times_before_the_change(self):
+        """A state within the last step has the parameters of that step, also when it is read later"""
+        scene = h.Scene()
+        torque = scene.parameter("torque", 2.)
+        body = scene.rigid_body("body", inertia=(1, 1, 1))
+        i, j = body.marker(), scene.ground.marker()
+        scene.add("hinge", h.Revolute(i, j))
+        motor = scene.add("motor", h.UserScalarForce(i, j, value=torque, rotational=True))
+        values = {"acceleration": h.angular_acceleration(i, "z"), "torque": h.force(motor, 0)}
+        for name, value in values.items():
+            scene.channel(name, value)
+        run = scene.run(tolerance=1e-6).solve(1.)
+        middle = .5 * (run.ts.getPrevTime() + run.time)
+        end = run.snapshot()
+        torque.set(50.)
+        for name, value in values.items():
+            self.assertAlmostEqual(run.snapshot(middle).value(value), 2., delta=1e-9, msg=name)
+            self.assertAlmostEqual(run.sample(middle)[name], 2., delta=1e-9, msg=name)
+            self.assertAlmostEqual(end.value(value), 2., delta=1e-9, msg=name)
+            self.assertAlmostEqual(run.snapshot().value(value), 50., delta=1e-9, msg=name)
+            self.assertAlmostEqual(run.sample()[name], 50., delta=1e-9, msg=name)
+        self.assertEqual(torque.get(), 50.)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -151,6 +151,14 @@ PetscErrorCode SetStart(TS ts, TSHHT3Start start)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What SetStart() has set; "TSHHT3GetStart_C" for what simulates a start */
+PetscErrorCode GetStart(TS ts, TSHHT3Start *start)
+{
+  PetscFunctionBegin;
+  *start = Get(ts).start_policy;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode GetAcceleration(TS ts, Vec *A)
 {
   Integrator &I = Get(ts);
@@ -190,6 +198,7 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(SetIS);
   HHT3_COMPOSE(GetIS);
   HHT3_COMPOSE(SetStart);
+  HHT3_COMPOSE(GetStart);
   HHT3_COMPOSE(GetAcceleration);
   HHT3_COMPOSE(GetStatistics);
   HHT3_COMPOSE(Interpolate);

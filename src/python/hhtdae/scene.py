@@ -190,8 +190,9 @@ class Scene:
 
         Numbers of the description change for runs made from now on; existing runs keep the old ones. Formulas of the state and callbacks,
         which read parameters when they are evaluated, change at once in all runs: simultaneous runs with different values there need separate scenes.
-        `Run.snapshot`, `Run.sample` and `Run.linearize` at the present time change, too; their forces, accelerations and reactions are then those
-        with which the run continues. If a value makes a formula jump in `Run.on_step` or in actions of events, call `Run.restart`: steps across a
+        `Run.snapshot`, `Run.sample` and `Run.linearize` at the present time change, too; their forces, accelerations and reactions, and velocities that
+        motions prescribe, are then those with which the run continues. At earlier times of the last step, and in snapshots taken before, they have the
+        values of parameters of that time. If a value makes a formula jump in `Run.on_step` or in actions of events, call `Run.restart`: steps across a
         jump lose accuracy. Between two parts of a run `Run.solve` and `Run.step_by` do so by themselves. If prescribed displacements or user
         constraints depend on parameters, positions are then moved to the nearest that satisfy them.
         """

@@ -29,10 +29,10 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
 {
   Vec                 W[3];
   const double       *w[3], *local[3];
-  std::vector<double> own, acceleration;
+  std::vector<double> own, acceleration, parameters;
   PetscFunctionBegin;
   Runtime *run;
-  TS       copy = nullptr; /* BeginCopy() of a run that has not begun */
+  TS       copy = nullptr; /* BeginCopy() of a run that has not begun, or whose constraints have been changed */
   PetscCall(FindRun(*this, ts, "Scene::sample()", &run));
   PetscCall(ReadCheckpoint(ts));
   for (Vec &x : W) {
@@ -41,7 +41,9 @@ PetscErrorCode Scene::sample(TS ts, PetscReal t, std::vector<double> &values)
     PetscCall(VecSetType(x, VECSTANDARD));
   }
   PetscCall(StateAt(ts, t, ChannelsFollowFromEquations(*run), W, &copy));
-  Runtime &R = copy ? *RunOf(copy) : *run;
+  PetscCall(ParametersAt(*run, ts, t, &parameters));
+  Runtime             &R = copy ? *RunOf(copy) : *run;
+  const WithParameters then(R.scene, parameters);
   for (int k = 0; k < 3; k++) PetscCall(VecGetArrayRead(W[k], &w[k]));
   PetscCall(LocalMotion(R, w[0], w[1], w[2], acceleration, local));
   R.bodies.move(local[0], local[1]);
