@@ -206,6 +206,16 @@ class Events(Folder):
         run.solve(.4)
         np.testing.assert_allclose(hits, [np.sqrt(2 * .6 / G)], atol=1e-5)
 
+    def test_of_another_scene(self):
+        scene, angle, _ = wheel()
+        other, foreign, _ = wheel()
+        run, hits = scene.run(tolerance=1e-6), []
+        with self.assertRaisesRegex(ValueError, r"event\(\): <measure angle> is of another scene"):
+            run.event(foreign - 1.)
+        run.event(angle - 5., lambda r: hits.append(r.time))
+        run.solve(1.)
+        np.testing.assert_allclose(hits, [.5], atol=1e-6)
+
 
 class Parameters(unittest.TestCase):
     def driven(self, **motion):

@@ -19,7 +19,7 @@ from .expressions import CONDITIONS, _expression
 from .ranks import together
 from .query import Linearization, Snapshot
 from .results import Channels, Page, Results
-from .spec import check_parameters, number
+from .spec import check_measures, check_parameters, number
 from .threads import one_thread
 from .tracing import ordered
 
@@ -242,6 +242,7 @@ class Run(Channels):
         if formula.op in CONDITIONS:
             formula = formula - 0.5
         check_parameters(ordered([formula]), self.scene, "event()")
+        check_measures(ordered([formula]), self.scene, "event()")
         self._events.append((formula, action, terminal))
         self._signs.add(direction, identity(formula, direction))
         if len(self._events) == 1:

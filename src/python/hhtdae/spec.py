@@ -56,6 +56,13 @@ def check_parameters(nodes, scene, who):
             raise ValueError("%s: parameter %s is of another scene; use one that parameter() of this scene has made" % (who, p.name))
 
 
+def check_measures(nodes, scene, who):
+    """Checks that measures are of markers and elements of the scene, whose numbers would stand for others"""
+    for n in nodes:
+        if n.op == "measure" and any(getattr(x, "_number", scene.ground._number) != scene.ground._number for x in n.value):
+            raise ValueError("%s: %r is of another scene; make it of markers, bodies and elements of this one" % (who, n))
+
+
 def has_formula(x, scene, who):
     """Whether a number of the description, or one in an array, is a formula of the scene's parameters"""
     found = formulas(x)
