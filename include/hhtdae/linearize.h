@@ -92,6 +92,7 @@ struct Steadiness {
   std::string body, elastic; /* that changes its velocities most; the same among elastic bodies, modal or whole */
   double      change = 0, elastic_change = 0;
   double      square_rate = 0; /* of the motion of the scene, or of its fall: 1/s^2 */
+  double      rounding    = 0; /* squares of rates of small motions up to here may be zero: what rounding leaves of the forces of the stiffest spring, 1/s^2 */
   double      spin        = 0; /* of the body that turns fastest, seen from space */
   std::string turning;         /* the body with modes that turns fastest relative to the axes, in which its modes are wrong: modal coordinates are in axes of the body; empty: none */
 };

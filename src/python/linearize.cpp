@@ -68,7 +68,7 @@ py::dict HowSteady(Linearized &l)
   using py::literals::operator""_a;
   Steadiness s;
   Check(l.get().steadiness(&s));
-  return py::dict("body"_a = s.body, "elastic"_a = s.elastic, "change"_a = s.change, "elastic_change"_a = s.elastic_change, "square_rate"_a = s.square_rate, "spin"_a = s.spin,
+  return py::dict("body"_a = s.body, "elastic"_a = s.elastic, "change"_a = s.change, "elastic_change"_a = s.elastic_change, "square_rate"_a = s.square_rate, "rounding"_a = s.rounding, "spin"_a = s.spin,
                   "turning"_a = s.turning);
 }
 

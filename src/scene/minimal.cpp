@@ -349,11 +349,22 @@ template <class T> void Unknowns(const Linearization::Work &w, const Minimal &m,
   for (std::size_t k = 0; k < m.algebraic.size(); k++) put(0, m.algebraic[k], other((Eigen::Index)(m.q.size() + m.s.size() + k)));
 }
 
-/* Eigenvalues with non-negative imaginary parts, and their vectors. LAPACK balances A; without balancing slow modes would
+/* Whether a complex pair is a double root zero, of a motion that nothing drives back. Rounding splits it into such a pair or into two real roots: the square of the value is then what
+   it leaves of the sum of the accelerations by the displacement x (Steady.test_free_driveline). */
+bool IsRoundingOfZero(const Minimal &m, Complex value, const Eigen::VectorXcd &x)
+{
+  constexpr double      roundings = 100;
+  const Eigen::VectorXd z         = x.head(m.dz()).cwiseAbs();
+  const double          sum       = (m.A.block(m.dz(), 0, m.dy(), m.dz()).cwiseAbs() * z).norm();
+  return std::norm(value) * z.norm() < roundings * PETSC_MACHINE_EPSILON * sum;
+}
+
+/* Eigenvalues with non-negative imaginary parts, and their vectors; double roots zero twice. LAPACK balances A; without balancing slow modes would
    be lost, because A has entries of order 1 for rates of positions and entries of the order of stiffness over mass for
    rates of velocities, up to 1e15 in a steel part of 1 mm (SmallBodies.Modes). */
-PetscErrorCode Eigenpairs(MPI_Comm comm, Dense A, std::vector<Complex> *value, Eigen::MatrixXcd *vector)
+PetscErrorCode Eigenpairs(MPI_Comm comm, const Minimal &m, std::vector<Complex> *value, Eigen::MatrixXcd *vector)
 {
+  Dense              A = m.A;
   const PetscBLASInt n = (PetscBLASInt)A.rows(), one = 1, ask = -1;
   Eigen::VectorXd    re(n), im(n);
   Dense              V(n, n);
@@ -371,6 +382,13 @@ PetscErrorCode Eigenpairs(MPI_Comm comm, Dense A, std::vector<Complex> *value, E
     if (im(k) < 0) continue; /* the conjugate of the eigenvalue before it */
     vector->col((Eigen::Index)value->size()) = V.col(k);
     if (im(k) > 0) vector->col((Eigen::Index)value->size()) += Complex(0, 1) * V.col(k + 1);
+    if (im(k) > 0 && IsRoundingOfZero(m, {re(k), im(k)}, vector->col((Eigen::Index)value->size()))) {
+      for (int twice = 0; twice < 2; twice++) {
+        vector->col((Eigen::Index)value->size()) = V.col(k);
+        value->push_back(0);
+      }
+      continue;
+    }
     value->push_back({re(k), im(k)});
   }
   PetscFunctionReturn(0);
@@ -389,7 +407,7 @@ PetscErrorCode Linearization::modes(std::vector<Mode> *all) const
   PetscCall(Reduce(w, {}, m));
   all->clear();
   if (!m.states()) PetscFunctionReturn(0); /* no degrees of freedom */
-  PetscCall(Eigenpairs(w.comm(), m.A, &value, &vector));
+  PetscCall(Eigenpairs(w.comm(), m, &value, &vector));
   std::vector<int> order(value.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return std::abs(value[a]) < std::abs(value[b]); });

@@ -124,6 +124,26 @@ PetscErrorCode Agree(MPI_Comm comm, Changes *x)
   PetscFunctionReturn(0);
 }
 
+/* The largest of the stiffnesses that hold one coordinate each, in units in which masses are 1: an upper estimate of the square of the fastest rate but for coordinates that work together */
+PetscErrorCode LargestStiffness(const Linearization::Work &w, double *largest)
+{
+  Vec           diagonal;
+  const double *k;
+  PetscFunctionBegin;
+  *largest = 0;
+  PetscCall(MatCreateVecs(w.K, nullptr, &diagonal));
+  PetscCall(MatGetDiagonal(w.K, diagonal));
+  PetscCall(VecGetArrayRead(diagonal, &k));
+  for (PetscInt i = 0; i < w.R->n; i++)
+    if (w.role[i] == TSHHT3_COORDINATE) *largest = std::max(*largest, w.unit[i] * w.unit[i] * std::abs(k[i]));
+  PetscCall(VecRestoreArrayRead(diagonal, &k));
+  PetscCall(VecDestroy(&diagonal));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 1, MPI_DOUBLE, MPI_MAX, w.comm()));
+  PetscFunctionReturn(0);
+}
+
+constexpr double roundings = 100; /* sums of a few terms leave so many times the rounding of one (Steady.test_free_driveline) */
+
 } // namespace
 
 PetscErrorCode Linearization::steadiness(Steadiness *s) const
@@ -161,6 +181,8 @@ PetscErrorCode Linearization::steadiness(Steadiness *s) const
   s->turning     = NameOf(scene, x.turning_body);
   s->spin        = std::sqrt(x.spin);
   s->square_rate = x.spin + x.speed / (w.size * w.size) + gravity / w.size;
+  PetscCall(LargestStiffness(w, &s->rounding));
+  s->rounding *= roundings * PETSC_MACHINE_EPSILON;
   PetscFunctionReturn(0);
 }
 

@@ -153,6 +153,37 @@ class Steady(unittest.TestCase):
         self.assertLess(abs(hub_mode.value), 1e-6)
         self.assertAlmostEqual(lag.value.imag, 5. * np.sqrt(0.25 / 1.25), delta=1e-6)
 
+    def driveline(self, axis, damping=0.):
+        """Three wheels on one axle that two springs couple, at rest"""
+        scene, axes = h.Scene(), h.axes_along(axis)
+        markers = []
+        for k, J in enumerate((.15, .4, .05)):
+            body = scene.rigid_body("b%d" % k, mass=1, inertia=(J,) * 3)
+            markers.append(body.marker_at((0, 0, 0), axes))
+            scene.add("r%d" % k, h.Revolute(markers[-1], scene.ground.marker(axes=axes)))
+        for k, stiffness in enumerate((2e4, 8e3)):
+            scene.add("s%d" % k, h.TorsionalSpringDamper(markers[k + 1], markers[k], stiffness=stiffness, damping=damping))
+        return scene, markers
+
+    def test_free_driveline(self):
+        """It turns freely, a motion without a rate whatever rounding makes of it: twice zero; and it is in equilibrium"""
+        rng = np.random.default_rng(0)
+        for damping in (0., 1e-3):
+            for axis in rng.normal(size=(15, 3)):
+                modes = self.driveline(axis, damping)[0].run().linearize().modes()
+                self.assertEqual(len(modes), 4)
+                for mode in modes[:2]:
+                    self.assertLess(abs(mode.value), 1e-4)
+                    self.assertEqual(mode.value.imag, 0.)
+                    self.assertGreater(np.abs(mode.shape).max(), 0.)
+                np.testing.assert_allclose([mode.value.imag for mode in modes[2:]], [1.5e5**.5, (6.4e5 / 3)**.5], rtol=1e-6)
+        for axis in ((1, 2, 3), (3, 1, -1)):
+            scene, markers = self.driveline(axis)
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                scene.run().linearize().modes(2)
+                scene.run().linearize().response(h.Excitation.torque(markers[0], axis), h.angular_velocity(markers[2], "z", frame=markers[2]), [1e-3, 1.])
+
     def test_steady(self):
         """A round rotor from space, a mast on a hub from the hub, and free fall"""
         scene = h.Scene(gravity=(0, 0, -9.81))

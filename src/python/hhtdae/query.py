@@ -266,7 +266,7 @@ class Linearization:
         if not now["change" if sparse else "elastic_change"]:
             return
         own = now["square_rate"]  # a motion that nothing drives back has no rate of its own: the scene's counts
-        squares = [x if x > 1e-4 * own else own for x in (abs(rate)**2 for rate in (rates() if callable(rates) else rates))]
+        squares = [x if x > max(1e-4 * own, now["rounding"]) else own for x in (abs(rate)**2 for rate in (rates() if callable(rates) else rates))]
         square = min((x for x in squares if x), default=0.)
         limit = 1e-3 * square
         if not square or now["change" if sparse else "elastic_change"] <= limit:
