@@ -94,12 +94,14 @@ PetscErrorCode CheckTime(Runtime &R, PetscReal t)
 
 PetscErrorCode TestAxes(TS ts, PetscReal t, Vec U, Vec V, PetscBool *change, void *ctx)
 {
-  Runtime &R = *static_cast<Runtime *>(ctx);
+  Runtime        &R = *static_cast<Runtime *>(ctx);
+  const PetscReal h = R.accepted > PETSC_NINFINITY ? t - R.accepted : 0; /* 0: at the first state, and at that of a checkpoint */
   PetscFunctionBegin;
   PetscCall(CheckTime(R, t));
   PetscCall(TellOfNoOutput(R, ts));
   PetscCall(AngleTolerances(R, ts));
   PetscCall(Remember(R, U, V));
+  PetscCall(TellOfLostTurns(R, ts, h));
   PetscCall(CheckDropped(R, t, U, V));
   PetscCall(ChooseNewAxes(R, U, V));
   *change = R.changing_axes ? PETSC_TRUE : PETSC_FALSE;

@@ -66,6 +66,7 @@ struct Runtime {
   std::vector<double>   step_parameters;                         /* values of the scene's parameters at the beginning of the last step */
   PetscReal           accepted = PETSC_NINFINITY;         /* time of the accepted state to which axes and memories belong */
   bool                  steps_limited = false;                   /* whether an element on any rank limits the step size */
+  bool                  told_of_lost_turns = false;
   std::vector<double>   reference_before;                        /* previous reference attitudes of own bodies' local rotations: quaternions */
   std::vector<Matrix3>  next_axes;                               /* new axes of own bodies near the singularity of Euler angles, see reframe.cpp */
   std::vector<PetscInt> next_body;                               /* local numbers of these bodies */
@@ -153,6 +154,8 @@ PetscErrorCode     ReadKept(Runtime &R, const double *x); /* after one was read 
 PetscErrorCode     KeepNumbers(TS ts);                    /* lets checkpoints have the queried angles and Runtime::notes */
 /* step_limit.cpp: upper bounds on the step size, so that no contact is tunnelled through and no full turn of an angle is lost */
 PetscErrorCode AttachStepLimit(Runtime &R, TS ts);
+/* a notice if the step h, which has ended where the bodies are, was fixed and too long for an angle over full turns */
+PetscErrorCode TellOfLostTurns(Runtime &R, TS ts, PetscReal h);
 /* expressions.cpp: variables, states, user's forces */
 PetscErrorCode LocalizeExpressions(Runtime &R, Localizer &l);
 /* output/channels.cpp: markers and unknowns that own channels read; output/recorder.cpp */

@@ -16,6 +16,8 @@ namespace
    (src/integrator/coordinates/rotations.cpp), and the error estimate contains only the first neglected term */
 constexpr double max_rotation_per_step = 1;
 
+constexpr double radians_of_half_a_turn = M_PI, radians_of_longest_turn = 2; /* the latter: LongestTurn() */
+
 /* Reduces *max_step to the upper bounds of the elements of this rank */
 PetscErrorCode LimitOfElements(Runtime &R, PetscReal t, Vec U, Vec V, Vec A, const Horizon &horizon, double *max_step)
 {
@@ -76,6 +78,34 @@ PetscErrorCode AttachStepLimit(Runtime &R, TS ts)
   if (R.size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, R.scene.comm));
   R.steps_limited = any;
   if (any || (R.rotates_in_space && R.bodies.local)) PetscCall(TSHHT3SetStepLimit(ts, Limit, &R));
+  PetscFunctionReturn(0);
+}
+
+PetscErrorCode TellOfLostTurns(Runtime &R, TS ts, PetscReal h)
+{
+  TSAdapt   adapt;
+  PetscBool fixed;
+  PetscFunctionBegin;
+  if (!R.has_memory || !R.steps_limited || R.told_of_lost_turns || h <= 0) PetscFunctionReturn(0);
+  PetscCall(TSGetAdapt(ts, &adapt));
+  PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &fixed));
+  if (!fixed) PetscFunctionReturn(0); /* else Limit() has bounded the step */
+  const std::vector<double> zero(R.n + R.others.size(), 0.); /* accelerations: the speed alone says how far the step has turned */
+  const Evaluation          e{0, zero.data(), zero.data(), zero.data(), R.bodies, R.n};
+  double                    longest = std::numeric_limits<double>::infinity(), fastest = -1;
+  PetscInt                  body    = -1;
+  for (const auto &b : R.batches)
+    if (b->memory()) longest = std::min(longest, b->longestStep(e));
+  if (h <= radians_of_half_a_turn / radians_of_longest_turn * longest) PetscFunctionReturn(0);
+  R.told_of_lost_turns = true;
+  for (std::size_t b = 0; b + 1 < R.bodies.body.size(); b++) {
+    const double speed = R.bodies.now[b].w.norm();
+    if (speed <= fastest) continue;
+    fastest = speed;
+    body    = R.bodies.body[b].id;
+  }
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "scene: fixed steps of %g are too long to count full turns: one has turned body %s by %.3g rad. Angles of channels, springs, gears and formulas lose turns where a step "
+                        "turns them by more than half of one; take shorter steps, or those that the error chooses\n", (double)h, R.scene.bodyName(body).c_str(), fastest * (double)h));
   PetscFunctionReturn(0);
 }
 

@@ -161,6 +161,27 @@ TEST(CountedAngles, InThePlaneWhateverTheStep)
   EXPECT_NEAR(angleOf(run.ts, w.i, w.j), 52 * turn, 1e-6);
 }
 
+/* Fixed steps lose the turns that springs and channels count in space if a step turns them by more than half of one; steps of the integrator's choice never do */
+TEST(CountedAngles, FixedStepsThatAreTooLong)
+{
+  struct Case {
+    const char *options;
+    double      speed;
+    bool        told;
+  };
+  for (const auto &[options, speed, told] : {Case{"-ts_adapt_type none -ts_dt 0.1", 40, true}, Case{"-ts_adapt_type none -ts_dt 0.1", 30, false}, Case{"-ts_rtol 1e-3", 40, false}}) {
+    Wheel   w(speed);
+    Printed printed;
+    w.scene.add("spring", TorsionalSpringDamper{w.i, w.j, 1e-6});
+    SceneRun run(w.scene, 1, options);
+    must(run.solve());
+    const std::string text = "scene: fixed steps of 0.1 are too long to count full turns: one has turned body wheel by 4 rad.", all = printed.text();
+    EXPECT_EQ(printed.says(text), told) << options << " " << speed << "\n" << all;
+    EXPECT_EQ(all.find(text), all.rfind(text));
+    EXPECT_EQ(std::abs(angleOf(run.ts, w.i, w.j) - speed) < 1e-3, !told) << speed;
+  }
+}
+
 /* An event of TSSetEventHandler() ends the run after five turns, not where the angle is zero again for the first time */
 TEST(CountedAngles, InEvents)
 {

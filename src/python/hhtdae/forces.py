@@ -45,7 +45,8 @@ class NonlinearSpring(_Joint):
 
 @_spec
 class TorsionalSpringDamper(_Joint):
-    """Moment preload - stiffness (a - angle) - damping a' on i's body about z_j, a the angle of i's x axis from j's. Component: the moment.
+    """Moment preload - stiffness (a - angle) - damping a' on i's body about z_j, a the angle of i's x axis from j's. Component: the moment. The angle is in
+    (-pi, pi] at the start, also where a motion prescribes more, and counts full turns from there. Fixed steps that turn it by more than half a turn lose turns.
 
     stiffness : moment per radian, not negative
     damping : moment per angular velocity, not negative
@@ -261,9 +262,9 @@ class SphereBox(_Joint):
 
 @_spec
 class RotationalStop(_Joint):
-    """Limits of the angle of i's x axis about z_j. Component: the moment on i's body.
+    """Limits of the angle of i's x axis about z_j, from j's. Component: the moment on i's body.
 
-    lower, upper : radians, over full turns
+    lower, upper : radians, over full turns; the angle is in (-pi, pi] at the start, also where a motion prescribes more, and counts full turns from there
     law : in moment and radians, without friction"""
     lower: Number = -inf
     upper: Number = inf

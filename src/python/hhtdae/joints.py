@@ -216,7 +216,8 @@ class UserConstraint(Spec):
 
 @_spec
 class RotationalMotion(Spec):
-    """Prescribes the angle of i about z_j. Multiplier: moment about z_j.
+    """Prescribes the angle of i's x axis about z_j, from j's. Multiplier: moment about z_j. It begins where the function says but for full turns: where `angle`, springs and stops
+    of the same markers begin, in (-pi, pi], from where all count full turns.
 
     function : of time: a number, a `TimeFunction`, a formula of time(), or a Python function of t, which is traced; radians
     of : "displacement", "velocity" or "acceleration": what the function is

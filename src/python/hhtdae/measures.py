@@ -88,7 +88,8 @@ def angle(i, j):
     """Angle of i's x axis about j's z axis from j's x axis, radians; in (-pi, pi] at the start, from where full turns are counted.
 
     In spatial scenes this holds if an element, a variable, a state or a channel reads the angle. If only snapshots or events read it, the first
-    value is in (-pi, pi], and full turns are counted from then on. Make a channel of an angle that is read later.
+    value is in (-pi, pi], and full turns are counted from then on. Make a channel of an angle that is read later. It is in (-pi, pi] at the start
+    also where a motion prescribes more. Fixed steps (``ts_adapt_type`` none) that turn it by more than half a turn lose turns, which the run reports.
     """
     return Measure("angle", i, j)
 

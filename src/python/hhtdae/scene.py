@@ -522,7 +522,7 @@ class Scene:
             The new run continues from the present state of that run, with the present values of parameters.
         options : dict, optional
             PETSc's options without the dash, ``{"ts_adapt_type": "none", "ts_dt": 1e-3}``, for this run only; options of the command line have
-            precedence.
+            precedence. Fixed steps, as in this example, must be short enough for angles over full turns, see `angle`.
         page : bool or str
             Whether frames for `Run.page` are recorded; a string is the name of the file, otherwise it is a temporary one. Title, and number of
             frames or time between them, are those of `output`.
