@@ -83,6 +83,17 @@ class Angles(Folder):
             self.assertAlmostEqual(run.load(self.file).snapshot().value(angle), 20., delta=1e-5)
             self.assertAlmostEqual(run.solve(3.).snapshot().value(angle), 30., delta=1e-5)
 
+    def test_other_markers_of_the_same_number(self):
+        """Of markers that are made after the first run the checkpoint's may be others"""
+        scene, _, body = wheel(counted=False)
+        run = scene.run(tolerance=1e-6)
+        run.snapshot().value(h.angle(body.marker(), scene.ground.marker()))
+        run.solve(2.).save(self.file)
+        scene, _, body = wheel(counted=False)
+        run = scene.run(tolerance=1e-6)
+        other = body.marker(axes=h.rotation((0, 0, 1), -1.))
+        self.assertAlmostEqual(run.load(self.file).snapshot().value(h.angle(other, scene.ground.marker())), 19. - 6 * np.pi, delta=1e-5)
+
     def test_counted_by_nobody(self):
         scene, angle, _ = wheel(counted=False)
         scene.run(tolerance=1e-6).solve(2.).save(self.file)
