@@ -95,7 +95,7 @@ PetscErrorCode TellOfLostTurns(Runtime &R, TS ts, PetscReal h)
   double                    longest = std::numeric_limits<double>::infinity(), fastest = -1;
   PetscInt                  body    = -1;
   for (const auto &b : R.batches)
-    if (b->memory()) longest = std::min(longest, b->longestStep(e));
+    if (b->memory()) longest = std::min(longest, b->longestStep(e, Horizon{0, 0})); /* no contacts are foreseen */
   if (h <= radians_of_half_a_turn / radians_of_longest_turn * longest) PetscFunctionReturn(0);
   R.told_of_lost_turns = true;
   for (std::size_t b = 0; b + 1 < R.bodies.body.size(); b++) {
