@@ -190,14 +190,15 @@ struct Path {
      that are rounded */
   PetscErrorCode roundingOfRows(std::vector<PetscReal> &rounding)
   {
+    constexpr int times_rounding = 8; /* times rounding */
     PetscInt               start;
     std::vector<PetscReal> f;
     PetscFunctionBegin;
     PetscCall(VecGetOwnershipRange(U, &start, NULL));
     rounding.assign(now.size(), PETSC_MACHINE_EPSILON * largest);
-    PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + PETSC_MACHINE_EPSILON * RandomRounding(start + i, 0)); }, Read(U), Write(at)));
+    PetscCall(ForEntries([&](PetscInt i, PetscScalar u, PetscScalar &x) { x = u * (1 + times_rounding * PETSC_MACHINE_EPSILON * RandomRounding(start + i, 0)); }, Read(U), Write(at)));
     PetscCall(rows(t, f));
-    for (size_t i = 0; i < f.size(); i++) rounding[i] = PetscMax(rounding[i], PetscAbsReal(f[i] - now[i]));
+    for (size_t i = 0; i < f.size(); i++) rounding[i] = PetscMax(rounding[i], PetscAbsReal(f[i] - now[i]) / times_rounding);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 };

@@ -373,6 +373,10 @@ PetscErrorCode StartFromSolution(TS ts)
   PetscCall(UpdateWeights(ts, I.U0));
   PetscCall(FindExcitation(ts));
   PetscCall(CheckInitialState(ts, &have));
+  if (I.rotations.refer && I.start_policy == TSHHT3_START_PROJECT) {
+    PetscCall(ReferToState(ts));
+    have = {};
+  }
   PetscCall(StartFromState(ts, have));
   PetscCall(PetscLogEventEnd(events.start, ts, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
