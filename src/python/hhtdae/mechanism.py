@@ -90,8 +90,8 @@ def solve_mechanism(residual, t_span, q0, v0, *, constraints=None, velocity_cons
         constraint_jacobian(t, q, *args) returns Phi_q, (m, n), an array or a sparse matrix of SciPy. Default: central differences, with which a
         given one is compared at the initial time.
     rtol, atol : float
-        Relative and absolute tolerance of the error of positions in every step, max(atol, rtol times the largest value so far). The error of the
-        whole solution is larger: the method is of order two, its steps are proportional to tol^(1/3), its errors to tol^(2/3), or to tol^(1/2) if
+        Relative and absolute tolerance of the error of positions in every step, for each coordinate max(atol, rtol times its own largest size so
+        far). The error of the whole solution is larger: the method is of order two, its steps are proportional to tol^(1/3), its errors to tol^(2/3), or to tol^(1/2) if
         forces jump at unknown times.
     t_eval : sequence of float, optional
         Times of the output, increasing; default: the ends of steps. Between the ends of steps accelerations and multipliers solve the equations

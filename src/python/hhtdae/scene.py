@@ -509,9 +509,9 @@ class Scene:
         Parameters
         ----------
         tolerance : float, optional
-            Tolerance of the error of positions in every step, in the unit of length and radians, multiplied by max(1, largest coordinate so far)
-            (PETSc's default: 1e-4). Motions smaller than the tolerance are not resolved: if all motions are of micrometres, in metres, or a
-            contact a hundred metres from the origin deforms by millimetres, a correspondingly smaller tolerance is required. Rotations are tested
+            Tolerance of the error of positions in every step, in the unit of length and radians; for each coordinate it is multiplied by max(1,
+            its own largest size so far) (PETSc's default: 1e-4). Motions smaller than the tolerance are not resolved: if all motions are of
+            micrometres, in metres, or a contact a hundred metres from the origin deforms by millimetres, a correspondingly smaller tolerance is required. Rotations are tested
             with the same number, in radians: if lengths are small numbers in their unit, set a separate tolerance of angles,
             ``scene.start(angle_tol=1e-6)``; otherwise the run may need a hundred times as many steps.
         sample : float or None
