@@ -329,7 +329,9 @@ for _name in ("sin cos tan arcsin arccos arctan arctan2 sinh cosh tanh exp log l
 def where(condition, a, b):
     """``a`` if the condition holds, else ``b``, selected in every evaluation; both are evaluated. Arrays are treated element by element.
 
-    For a load that jumps at a time, a `Parameter` that an action of `Run.event` sets is better, see `time`."""
+    For a load that jumps at a time, a `Parameter` that an action of `Run.event` sets is better, see `time`. A force that jumps with the sign of
+    a velocity, ideal Coulomb friction, has no solution while the body sticks, and steps become tiny there: regularize it, ``mu * tanh(v / v_slip)``,
+    or let an event hold the body."""
     return _by_elements(_where, condition, a, b)
 
 
