@@ -75,7 +75,7 @@ struct Perpendicular { Marker i, j; };  /* z axes are perpendicular. Row: moment
 /* Each axis of i is parallel to the same axis of j; two of them may be opposite, and remain so if described so. Axes of i that are parallel
    to another axis of j are an error, as in Fixed and Translational. Rows: moment x_j y_j z_j */
 struct Orientation { Marker i, j; };
-struct PointDistance { Marker i, j; double length = -1; }; /* negative: the distance at the start. Row: the tension, which pulls the origins together */
+struct PointDistance { Marker i, j; double length = -1; }; /* negative: the distance at the start, or where a continued run gets it. Row: the tension, which pulls the origins together */
 /* Origin of i on the curve (c_x(s), c_y(s), c_z(s)) in j's axes. Rows: force along two normals of the curve, perpendicular to each other,
    which rotate about the tangent as little as possible (planar scenes: force along z x tangent, the tangent in the order of the points) */
 struct PointOnCurve {

@@ -276,7 +276,9 @@ public:
   /* A run that continues from the present state of another run of this scene: with its time, positions, velocities, states and angles over
      full turns, but with the present parameters and elements that may be missing. Velocities that violate the present joints are projected
      in the metric of the mass matrix, as in a plastic impact, unless start().assembly is Off; positions that violate them are an error as
-     at any start. Elements that count angles over full turns or follow a curve must not appear or disappear: torsional springs,
+     at any start. What an element takes from the start (the length of a PointDistance, the value that a Gear, RackAndPinion, Coupler, Screw or mesh
+     keeps) stays as it is; of a PointDistance that comes, and of a coupler or mesh whose ratio, radius, factors or pitch have changed, it is that of
+     the present positions, so that none of these moves a body. Elements that count angles over full turns or follow a curve must not appear or disappear: torsional springs,
      RotationalStop, Screw, Coupler, gears, racks, PointOnCurve, user constraints and forces that read angles. A RotationalMotion may,
      unless it prescribes accelerations. Result files are overwritten: give the run other names, or its TS a prefix. */
   PetscErrorCode createTS(TS *ts, TS from);

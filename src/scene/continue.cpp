@@ -130,6 +130,18 @@ PetscErrorCode CopyElementMemories(const Runtime &from, SceneData &to)
   PetscFunctionReturn(0);
 }
 
+/* Values that elements take from the start (lengths, sums of couplers): those that the run before has keep them, others take them from its present poses, which `to` describes */
+void ContinueElements(const SceneData &from, SceneData &to)
+{
+  for (std::size_t e = 0; e < to.elements.size(); e++)
+    for (std::size_t k = 0; k < to.elements[e].parts.size(); k++) {
+      const Part &p     = to.elements[e].parts[k];
+      const bool  known = e < from.elements.size() && k < from.elements[e].parts.size();
+      const Part  none  = {nullptr, -1}, before = known ? from.elements[e].parts[k] : none;
+      p.store->continueFrom(to, p.index, before.store, before.index);
+    }
+}
+
 /* Copies the state between runs of the same model */
 PetscErrorCode CopyState(const Runtime &from, TS ts, Runtime &to, TS next)
 {
@@ -508,6 +520,7 @@ PetscErrorCode Scene::createTS(TS *ts, TS from)
     M.inherited_misfit    = 1e-2 * (atol + rtol) / std::max(MechanismSize(M.scene, DescribeAll(M.scene, t, FixedBodies::None)), 1e-2 * (atol + rtol));
     PetscErrorCode failed = CopyElementMemories(*old, M.scene);
     if (!failed) failed = WriteState(M, *old, U, V);
+    if (!failed) ContinueElements(old->scene, M.scene);
     if (!failed) failed = createTS(ts);
     journal_->stale = true; /* this model belongs to this run only; the next run from the start needs a new description */
     PetscCall(failed);

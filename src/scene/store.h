@@ -56,6 +56,12 @@ public:
   virtual int           memory() const { return 0; }
   /* sets the initial memory of an instance; without this call it is that of the description */
   virtual void          remember(PetscInt, double *) {}
+  /* In a run that goes on from another one: sets the values that an instance takes from the start, such as lengths, by
+     the described poses, which are the present ones, unless it keeps those of instance `of` of `before`; before: null if
+     the other run has no such instance */
+  virtual void          continueFrom(const SceneData &, PetscInt, const StoreBase *, PetscInt) {}
+  /* what is so where the rows of a constraint are no numbers, for messages; null: nothing is known */
+  virtual const char   *undefined() const { return nullptr; }
   virtual int           inputs() const { return 0; }
   virtual ScalarRef     input(PetscInt, int) const { return {}; }
   virtual void          localize(Localizer &l, std::vector<std::unique_ptr<Batch>> &batches) const = 0;
@@ -87,6 +93,16 @@ template <class K> struct Described {
   typename K::Data data;
 };
 
+template <class K, class = void> struct TakesFromStart : std::false_type {};
+template <class K> struct TakesFromStart<K, std::void_t<decltype(&K::continueFrom)>> : std::true_type {};
+
+template <class K, class = void> struct WhereUndefined {
+  static constexpr const char *text = nullptr;
+};
+template <class K> struct WhereUndefined<K, std::void_t<decltype(K::undefined)>> {
+  static constexpr const char *text = K::undefined;
+};
+
 /* Common part of the stores of constraints and forces */
 template <class K> class StoreOf : public StoreBase
 {
@@ -100,6 +116,17 @@ public:
   bool      asForceStates(PetscInt e) const override { return all[e].as_force_states; }
   int       memory() const override { return K::memory; }
   void      remember(PetscInt e, double *x) override { CopyMemory<K>(all[e], x, true); }
+  void      continueFrom(const SceneData &s, PetscInt e, const StoreBase *before, PetscInt of) override
+  {
+    if constexpr (TakesFromStart<K>::value) {
+      const auto   *same = dynamic_cast<const StoreOf *>(before);
+      Frame<double> f[K::markers];
+      for (int k = 0; k < K::markers; k++) f[k] = s.frame(Marker{all[e].marker[k]});
+      K::continueFrom(all[e].data, same ? &same->all[of].data : nullptr, f);
+    }
+    (void)s, (void)e, (void)before, (void)of;
+  }
+  const char *undefined() const override { return WhereUndefined<K>::text; }
   int       inputs() const override { return K::inputs; }
   ScalarRef input(PetscInt e, int i) const override { return all[e].input[i]; }
 

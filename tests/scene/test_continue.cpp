@@ -1,5 +1,6 @@
 /* Runs that continue from the state of another run: joints that are released or engaged, other parameters, or the same scene */
 #include "hhtdae/query.h"
+#include "own_ts.h"
 #include "scene_output.h"
 #include <cmath>
 
@@ -278,6 +279,72 @@ TEST(Continue, TurnsOfGearsAndScrewsGoOn)
       EXPECT_NEAR(x.position(2), 9 * (until + 1) * 0.2 / (2 * M_PI), 1e-6) << until;
       must(TSDestroy(&ts));
     }
+  }
+}
+
+/* Gears get another ratio, racks and screws another radius and pitch, and a cable is tied: no position jumps, and velocities are those of the new teeth. They go on in
+   further runs, and what a run from the start takes from there stays as it was */
+TEST(Continue, WhatIsTakenFromTheStart)
+{
+  for (Assembly assembly : {Assembly::Report, Assembly::Project}) {
+    Scene           s(PETSC_COMM_SELF);
+    const Parameter size = s.parameter("size", .1), tied = s.parameter("tied", 0);
+    s.parameter("other", 1);
+    s.start().assembly = assembly;
+    const auto body    = [&](const char *name, double y, double spin, double speed) {
+      RigidBody b;
+      b.position         = {0, y, 0};
+      b.angular_velocity = {0, 0, spin};
+      b.velocity         = {0, 0, speed};
+      return s.add(name, b);
+    };
+    const Body   pinion = body("pinion", 0, 1, 0), rack = body("rack", 1, 0, .1), wheel = body("wheel", 2, -10, 0), nut = body("nut", 3, 4, .2 / M_PI), big = body("big", 4, 4, 0),
+                 small = body("small", 5, -12, 0), load = body("load", 6, 0, 1);
+    const auto   fixed = [&](double y) { return s.marker(s.ground(), {0, y, 0}); };
+    const Marker p = s.marker(pinion), P = fixed(0), r = s.marker(rack), R = fixed(1), w = s.marker(wheel), W = fixed(2), n = s.marker(nut), N = fixed(3), b = s.marker(big), B = fixed(4),
+                 c = s.marker(small), C = fixed(5), l = s.marker(load), anchor = s.marker(s.ground(), {0, 6, -1});
+    const Marker teeth = s.marker(s.ground(), [size] { return Place({0, 4 + 7.5 * size, 0}, Eigen::AngleAxisd(M_PI / 2, Vector3::UnitY()).toRotationMatrix()); });
+    const std::pair<Marker, Marker> turns[] = {{p, P}, {w, W}, {b, B}, {c, C}};
+    for (auto [i, j] : turns) s.add("", Revolute{i, j});
+    s.add("way", Translational{r, R});
+    s.add("rack", [=] { return RackAndPinion{p, P, r, R, size}; });
+    s.add("gear", [=] { return Gear{p, P, w, W, size}; });
+    s.add("screw", [=] { return Screw{n, N, size}; });
+    s.add("mesh", GearMesh{b, B, c, C, teeth});
+    s.add("cable", [=] { return tied > 0 ? std::optional<PointDistance>(PointDistance{l, anchor}) : std::nullopt; });
+    SceneRun first(s, 1.3, tolerance(1e-8));
+    must(first.solve());
+    must(s.set("size", .11));
+    must(s.set("tied", 1));
+    OwnTS second;
+    must(s.createTS(&second.ts, first.ts));
+    const auto same = [&](TS x, TS y) {
+      for (Marker k : {p, r, w, n, b, c, l}) {
+        EXPECT_LT((of(x, k).position - of(y, k).position).norm(), 1e-7);
+        EXPECT_LT((of(x, k).axes - of(y, k).axes).norm(), 1e-7);
+      }
+    };
+    same(first.ts, second.ts);
+    const auto rates = [&](TS ts, double error) {
+      EXPECT_NEAR(of(ts, r).velocity(2), .11 * of(ts, p).angular_velocity(2), error);
+      EXPECT_NEAR(of(ts, w).angular_velocity(2), -of(ts, p).angular_velocity(2) / .11, error);
+      EXPECT_NEAR(of(ts, n).velocity(2), .11 / (2 * M_PI) * of(ts, n).angular_velocity(2), error);
+      EXPECT_NEAR(of(ts, c).angular_velocity(2), -.825 / .175 * of(ts, b).angular_velocity(2), error);
+      EXPECT_NEAR(of(ts, l).velocity(2), 0, error);
+    };
+    rates(second.ts, 1e-9);
+    must(s.set("other", 2));
+    OwnTS third;
+    third.ts = goOn(s, second.ts, 2);
+    rates(third.ts, 1e-6);
+    OwnTS fourth;
+    must(s.createTS(&fourth.ts, third.ts));
+    same(third.ts, fourth.ts);
+    must(s.set("size", .1));
+    must(s.set("tied", 0));
+    SceneRun again(s, 1.3, tolerance(1e-8));
+    must(again.solve());
+    same(first.ts, again.ts);
   }
 }
 

@@ -82,9 +82,9 @@ class _Two(Spec):
 
 @_spec
 class Gear(_Two):
-    """Couples the angles of two joints: angle_1 + ratio angle_2 keeps its initial value. Its torques are about the joints' axes; for tooth
-    forces, which load the bearings, use `GearMesh`. Multiplier: the moment on the body of i1 about z_j1; the moment on the body of i2 is ratio
-    times as large."""
+    """Couples the angles of two joints: angle_1 + ratio angle_2 keeps its initial value (`Scene.run` says which one where a run continues). Its
+    torques are about the joints' axes; for tooth forces, which load the bearings, use `GearMesh`. Multiplier: the moment on the body of i1 about
+    z_j1; the moment on the body of i2 is ratio times as large."""
     ratio: Number = 1.
 
 

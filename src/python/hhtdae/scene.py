@@ -519,7 +519,10 @@ class Scene:
             within steps are usually more accurate than those at the ends, but not with fast, weakly damped modes, above all of flexible bodies,
             see `Snapshot`. Sample these at the ends of steps, or use a smaller tolerance.
         after : Run, optional
-            The new run continues from the present state of that run, with the present values of parameters.
+            The new run continues from the present state of that run, with the present values of parameters. What elements have taken from the start
+            (the length of a `PointDistance`, the value that a gear, rack, coupler, screw or mesh keeps) stays as it is; of a `PointDistance`
+            that comes, and of a coupler or mesh whose ratio, radius, factors or pitch have changed, it is that of the present positions, so that
+            none of these moves a body. Velocities change as in a plastic impact.
         options : dict, optional
             PETSc's options without the dash, ``{"ts_adapt_type": "none", "ts_dt": 1e-3}``, for this run only; options of the command line have
             precedence. Fixed steps, as in this example, must be short enough for angles over full turns, see `angle`.

@@ -59,7 +59,7 @@ template <> Element Scene::enter(const std::string &name, const PointDistance &s
   if (!e.good()) return e.done();
   const double start = e.startDistance();
   e.require(!e.coincident(s.i, s.j), "the markers coincide at the start, must be apart; a spherical joint keeps points together");
-  e.rows<Distance>({s.length < 0 ? start : s.length});
+  e.rows<Distance>({s.length < 0 ? start : s.length, s.length < 0});
   return e.done();
 }
 

@@ -10,6 +10,7 @@
 #define HHTDAE_SCENE_KERNELS_COUPLER_H
 
 #include "angle.h"
+#include <algorithm>
 
 namespace hhtdae
 {
@@ -25,6 +26,7 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
     double memory[N] = {}; /* angles at the last accepted step, with full turns; zero for advances */
     double factor[N] = {};
     double start     = 0;
+    double moved     = 0; /* by which continueFrom() has moved `start` from the value of the description */
     int    axis      = 2; /* axis of j for advances */
   };
 
@@ -94,6 +96,13 @@ template <int N, int R> struct CouplerRow : Constraint<CouplerRow<N, R>, 2 * N, 
     for (int k = 0; k < R; k++) d.memory[k] = PrincipalAngle<double>(f[2 * k], f[2 * k + 1]);
     d.start = sum<double>(d, f);
   }
+  /* In a run that goes on from another one the sum keeps its initial value while the factors are the same; with others it has the value of the present pose from then on */
+  static void continueFrom(Data &d, const Data *before, const Frame<double> *f)
+  {
+    const bool same = before && std::equal(d.factor, d.factor + N, before->factor);
+    d.moved         = same ? before->moved : sum<double>(d, f) - d.start;
+    d.start += d.moved;
+  }
 };
 
 /* The advance along z_j minus pitch/(2 pi) times the angle keeps its initial value. Multiplier: force on i's body along z_j;
@@ -106,6 +115,7 @@ struct ScrewRow : Constraint<ScrewRow, 2, 1> {
     double memory[1] = {};
     double pitch     = 0; /* advance per turn */
     double start     = 0;
+    double moved     = 0; /* as that of CouplerRow */
   };
   static constexpr bool curved(int a, int b) { return AngleCurved(a, b) || AdvanceCurved(a, b); }
 
@@ -140,6 +150,11 @@ struct ScrewRow : Constraint<ScrewRow, 2, 1> {
   {
     d.memory[0] = PrincipalAngle<double>(f[0], f[1]);
     d.start     = lead<double>(d, f);
+  }
+  static void continueFrom(Data &d, const Data *before, const Frame<double> *f)
+  {
+    d.moved = before && d.pitch == before->pitch ? before->moved : lead<double>(d, f) - d.start;
+    d.start += d.moved;
   }
 };
 

@@ -34,6 +34,7 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
     double   memory[2] = {}; /* angles of the wheels at the last accepted step, with full turns */
     MeshSide side[2];
     double   start = 0;
+    double   moved = 0; /* as that of CouplerRow, coupler.h */
     int      axis  = 2; /* number of the axis of the carrier's marker that is e */
   };
 
@@ -117,6 +118,13 @@ template <bool Rack> struct MeshRow : Constraint<MeshRow<Rack>, 3, 1> {
       if (k < MeshRow::memory) d.memory[k] = PrincipalAngle<double>(i, j);
     }
     d.start = toothDisplacement<double>(d, f, 0) - toothDisplacement<double>(d, f, 1);
+  }
+  /* As that of CouplerRow; the teeth are others if they have other levers */
+  static void continueFrom(Data &d, const Data *before, const Frame<double> *f)
+  {
+    const bool same = before && perAngle(d, 0) == perAngle(*before, 0) && perAngle(d, 1) == perAngle(*before, 1);
+    d.moved         = same ? before->moved : toothDisplacement<double>(d, f, 0) - toothDisplacement<double>(d, f, 1) - d.start;
+    d.start += d.moved;
   }
 
   /* Displacement at P along e per angle of a wheel, and per advance of the rack along axis `along` of its bearing */

@@ -125,6 +125,8 @@ struct Distance : Constraint<Distance, 2, 1> {
   static constexpr bool        needs_rotation = false;
   struct Data {
     double length = 1; /* positive */
+    bool   at_start = false; /* whether it is the distance at the start */
+    double moved = 0; /* by which continueFrom() has moved `length` from the value of the description */
   };
 
   template <class T> static void value(const Data &data, const Frame<T> *f, const T &, T *phi)
@@ -145,6 +147,13 @@ struct Distance : Constraint<Distance, 2, 1> {
     H.setZero();
     H.block<3, 3>(0, 0) = H.block<3, 3>(6, 6) = k;
     H.block<3, 3>(0, 6) = H.block<3, 3>(6, 0) = -k;
+  }
+  /* The start of a link that comes in a run which goes on from another one is there */
+  static void continueFrom(Data &d, const Data *before, const Frame<double> *f)
+  {
+    if (!d.at_start) return;
+    d.moved = before && before->at_start ? before->moved : (f[0].x - f[1].x).norm() - d.length;
+    d.length += d.moved;
   }
 };
 
