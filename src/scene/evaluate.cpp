@@ -76,7 +76,7 @@ PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F)
     for (auto &b : R.batches) b->residual(e);
     R.bodies.loadCarriers();
     R.bodies.residual(local[0], local[1], local[2], f);
-    R.bad_force = AllFinite(f, R.n) ? -1 : BadForce(R, e);
+    R.bad_element = AllFinite(f, R.n) ? -1 : BadElement(R, e, f);
     return PetscErrorCode(0);
   });
   PetscCall(VecRestoreArrayWrite(F, &f));

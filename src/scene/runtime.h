@@ -85,7 +85,7 @@ struct Runtime {
   std::shared_ptr<ChannelWork> channels;
   std::shared_ptr<Recorder>                                                recorder; /* null without output */
 
-  PetscInt bad_force = -1; /* element of this rank that made the last residual not a number, BadForce() */
+  PetscInt bad_element = -1; /* element of this rank that made the last residual not a number, BadElement() */
 
   explicit Runtime(std::shared_ptr<const Model> m)
       : model(std::move(m)), scene(model->scene), number(model->number), rank(model->rank), size(model->size), n(model->n), start(model->start)
@@ -118,8 +118,8 @@ PetscErrorCode LocalState(Runtime &R, const double *u, const double *v, const do
 /* The same as LocalState(), but with other ranks' accelerations even if no element reads them; room: storage for these accelerations */
 PetscErrorCode LocalMotion(Runtime &R, const double *u, const double *v, const double *a, std::vector<double> &room, const double *local[3]);
 PetscErrorCode Residual(Runtime &R, double t, Vec U, Vec V, Vec A, Vec F);
-bool           AllFinite(const double *x, PetscInt n); /* bad_force.cpp */
-PetscInt       BadForce(Runtime &R, const Evaluation &e);
+bool           AllFinite(const double *x, PetscInt n); /* bad_element.cpp */
+PetscInt       BadElement(Runtime &R, const Evaluation &e, const double *f);
 PetscErrorCode Jacobian(Runtime &R, double t, Vec U, Vec V, Vec A, double sv, double sa, Mat J);
 /* reframe.cpp: reference attitudes of local rotations, axes of Euler angles, memories of accepted steps */
 PetscErrorCode AttachReframing(Runtime &R, TS ts);

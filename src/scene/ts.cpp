@@ -200,13 +200,21 @@ PetscErrorCode Scene::createTS(TS *ts)
   PetscFunctionReturn(0);
 }
 
+/* Why an element makes a residual that is not a number */
+static std::string WhatIsBad(const ElementData &e)
+{
+  for (const Part &p : e.parts)
+    if (p.store->undefined()) return p.store->undefined();
+  return std::string(e.type) + " " + e.name + " is not a number";
+}
+
 static PetscErrorCode RowName(TS, PetscInt row, char name[], size_t len, void *ctx)
 {
   const Runtime &R = *static_cast<Runtime *>(ctx);
   PetscFunctionBegin;
   PetscCall(Guarded([&] {
     std::string text = UnknownName(*R.model, row);
-    if (R.bad_force >= 0) text += std::string("; ") + R.scene.elements[R.bad_force].type + " " + R.scene.elements[R.bad_force].name + " is not a number";
+    if (R.bad_element >= 0) text += "; " + WhatIsBad(R.scene.elements[R.bad_element]);
     PetscCall(PetscStrncpy(name, text.c_str(), len));
     return PetscErrorCode(0);
   }));

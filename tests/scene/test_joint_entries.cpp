@@ -457,6 +457,7 @@ TEST(JointRuns, ADiscThatFallsFlat)
     ErrorTrap trap;
     EXPECT_NE(run.solve(), 0) << tolerance;
     EXPECT_TRUE(trap.says("rolling disc table")) << trap.message;
+    EXPECT_TRUE(trap.says("the disc falls flat on the plane")) << trap.message;
     PetscReal           t;
     std::vector<double> energy;
     must(TSGetTime(run.ts, &t));

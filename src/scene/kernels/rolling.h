@@ -45,9 +45,9 @@ template <class T> Vec3<T> Upward(double side, const Frame<T> *f)
 /* r |q| - n . d = 0, q = n - (n . z_i) z_i: the lowest point x_i - r q/|q| is in the plane. Multiplier: force on i's body
    along n, at the lowest point. A disc that lies flat has no lowest point. longestStep() ensures that a step at most
    halves the angle between disc and plane; below flat_angle the row is NaN, so that the run ends with an error that names
-   the joint (JointRuns.ADiscThatFallsFlat). */
+   the joint and the cause (JointRuns.ADiscThatFallsFlat). */
 struct DiscOnPlane : Constraint<DiscOnPlane, 2, 1> {
-  static constexpr const char *name = "disc on plane";
+  static constexpr const char *name = "disc on plane", *undefined = "the disc falls flat on the plane, where it has no lowest point";
   static constexpr double      flat_angle = 1e-2; /* rad, between the disc and the plane */
   using Data                        = RollingData;
   static constexpr bool curved(int a, int b) { return a == 3 || b == 3 || (a == 1 && b == 1); }
