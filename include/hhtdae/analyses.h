@@ -31,7 +31,8 @@ namespace hhtdae
 
 /* Moves the run to static equilibrium at time t, at rest: the equilibrium that a descent from the present state reaches, or the nearest one.
    Motions are held at their values at t; rates of first-order states are zero, and states that nothing reads keep their values. With motions
-   of velocities or accelerations that are not zero there is no equilibrium. Motions of positions have no velocity in it: a run in time
+   of velocities or accelerations that are not zero there is no equilibrium. Friction (JointFriction, of contacts) is regularized and zero at rest, so that it
+   holds nothing: what it would hold slides to where it rests without, or there is no equilibrium. Motions of positions have no velocity in it: a run in time
    gives it to the bodies as it begins, AssembleAt() for a Linearization of what turns. */
 PetscErrorCode StaticEquilibrium(TS ts, PetscReal t);
 

@@ -118,7 +118,7 @@ struct StartPolicy {
      mechanism (a group of bodies connected by joints, with their markers) */
   double    tolerance   = 1e-6;
   Redundant redundant   = Redundant::Drop;   /* -scene_redundant drop,refuse,keep */
-  bool      equilibrium = false;             /* -scene_equilibrium: the run starts at rest in static equilibrium */
+  bool      equilibrium = false;             /* -scene_equilibrium: the run starts at rest in static equilibrium, where friction holds nothing, see analyses.h */
   bool      view        = false;             /* -scene_view: prints what the start has done */
   double    time        = 0;                 /* -scene_start_time: time of the initial values */
   Rotations rotations   = Rotations::Local;  /* -scene_rotations local,euler313 */

@@ -558,7 +558,7 @@ PetscErrorCode RelaxAt(Runtime &R, double t, Vec U, PetscInt *iterations)
     PetscCall(DescribeRest(E, &what));
     SETERRQ(R.scene.comm, PETSC_ERR_CONV_FAILED,
             "no static equilibrium found in %d corrections: %s.\n"
-            "Start nearer to it, hold what is free to move for ever, or stop what never rests: a motion of constant velocity, a state with a constant rate",
+            "Start nearer to it, hold what is free to move for ever (friction holds nothing, since it is zero at rest), or stop what never rests: a motion of constant velocity, a state with a constant rate",
             (int)E.iterations, what.c_str());
   }
   PetscCall(VecCopy(E.U, U));

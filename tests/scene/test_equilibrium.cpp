@@ -3,6 +3,7 @@
 #include "hhtdae/helpers.h"
 #include "hhtdae/query.h"
 #include "scene/kernels/contact_law.h"
+#include "own_ts.h"
 #include "scene_output.h"
 #include "scene_start.h"
 
@@ -98,6 +99,24 @@ TEST(SceneEquilibrium, AnEccentricWheelRolls)
 }
 
 /* The same with a stop: from the stop itself, and from a distance */
+/* Friction is zero at rest and holds nothing on an incline; the message says so */
+TEST(SceneEquilibrium, FrictionHoldsNothing)
+{
+  Scene         s(PETSC_COMM_SELF);
+  const Matrix3 slope = Eigen::AngleAxisd(.2, Vector3::UnitY()).toRotationMatrix();
+  RigidBody     b;
+  b.position        = slope * Vector3(0, 0, .1);
+  const Body   ball = s.add("ball", b);
+  ContactLaw   law;
+  law.friction = .5;
+  s.add("", SpherePlane{s.marker(ball), s.marker(s.ground(), Vector3::Zero(), slope), .1, law});
+  s.gravity({0, 0, -9.81});
+  OwnTS     run(s);
+  ErrorTrap trap;
+  EXPECT_NE(StaticEquilibrium(run.ts, 0), 0);
+  EXPECT_TRUE(trap.says("friction holds nothing")) << trap.message;
+}
+
 TEST(SceneEquilibrium, ABallOnAStop)
 {
   for (double stiffness : {1e4, 1e6, 1e8})

@@ -368,7 +368,8 @@ class Run(Channels):
         no velocity: `assemble` afterwards gives bodies the velocities that motions prescribe, as `linearize` of what turns needs them; `solve`
         does so by itself. States that no equation reads, such as integrals for output, keep their values. If initial values violate
         constraints, call ``scene.start(assembly="project")`` before the run is made, or with "off": then the iteration starts from the described
-        positions. Collective."""
+        positions. Friction is zero at rest and holds nothing: what it would hold slides to where it rests without, or an error says that there is no
+        equilibrium. Collective."""
         _core.static_equilibrium(self._open(), self._at(time))
         return self
 

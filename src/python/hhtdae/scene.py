@@ -413,7 +413,7 @@ class Scene:
         redundant : {"drop", "refuse", "keep"}
             What happens with redundant constraints.
         equilibrium : bool
-            The run starts at rest in static equilibrium.
+            The run starts at rest in static equilibrium, in which friction holds nothing, see `Run.equilibrium`.
         view : bool
             Whether the results of the start are printed.
         time : float
