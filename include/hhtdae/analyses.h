@@ -45,7 +45,8 @@ PetscErrorCode AssembleAt(TS ts, PetscReal t);
    movement needs: inverse dynamics. Constraints of velocities are an error, what they do to positions needs a run in time.
    All of these follow the motions from the time of the run to t, in steps that are as short as need be to stay on the branch that the motion leads to
    where a linkage could be assembled in another way, also through change points, where velocities go on; the times of calls do not matter for that. Where motions return to a value
-   that they have had, what they did meanwhile is not looked at. */
+   that they have had, what they did meanwhile is not looked at. Near a position where constraints depend on one another, as at a dead centre, velocities,
+   accelerations and loads have few digits or none, and a notice names time and rows. */
 PetscErrorCode Kinematics(TS ts, PetscReal t);
 
 } // namespace hhtdae

@@ -17,6 +17,7 @@
   continue.
 */
 #include "hhtdae/analyses.h"
+#include "extension.h"
 #include "guard.h"
 #include "still.h"
 #include <algorithm>
@@ -65,6 +66,10 @@ constexpr double accurate_step = 1e-9;
    Only steps longer than long_step, in units of largest_turn, are compared, since in a start from rest the speed grows by any
    factor */
 constexpr double locked_speed = 100, long_step = 0.1;
+
+/* |Phi_q^T lambda| relative to |Phi_q| |lambda|, with lengths relative to the scene's size, up to which a notice says that constraints nearly depend on one another. Rounding of the
+   constraints' derivatives in time, over its square, is the relative error of accelerations and loads (Analyses.KinematicsAtADeadCentre) */
+constexpr double nearly_dependent = 1e-5;
 
 struct AssemblySystem : StillSystem {
   using StillSystem::StillSystem;
@@ -411,6 +416,71 @@ private:
   }
 };
 
+/* The length that is 1 in the metric of TellDependent(), for each own unknown: coordinates of bodies as in reach() */
+std::vector<double> Units(const StillSystem &E)
+{
+  const Runtime      &R = E.R;
+  std::vector<double> unit(R.n, 1.0);
+  for (PetscInt b = 0; b < R.bodies.own; b++) {
+    const LocalBody &k          = R.bodies.body[b];
+    const int        directions = PlanarScene(k.kind) ? 2 : 3, whole = Coordinates(k.kind);
+    for (int c = 0; c < R.bodies.coordinates(b); c++) unit[k.first + c] = c < directions ? E.size : c < whole ? 1 : E.size * std::sqrt(R.scene.bodies[k.id].mass);
+  }
+  for (const auto &e : R.scene.extensions)
+    for (PetscInt i = 0; i < e->coordinates(); i++) unit[e->start[R.rank] - R.start + i] = E.size;
+  return unit;
+}
+
+/* P: [1 Phi_q^T; Phi_q 0] at E.U, with coordinates in their units */
+PetscErrorCode GeometryOfConstraints(AssemblySystem &E, Mat *P)
+{
+  const Runtime            &R    = E.R;
+  const std::vector<double> unit = Units(E);
+  std::vector<PetscInt>     others;
+  Mat                       B;
+  double                   *x;
+  PetscFunctionBegin;
+  PetscCall(Jacobian(E.R, E.t, E.U, E.zero, E.zero, state_shift, mass_shift, E.J));
+  PetscCall(VecGetArrayWrite(E.d, &x));
+  std::copy(unit.begin(), unit.end(), x);
+  PetscCall(VecRestoreArrayWrite(E.d, &x));
+  for (PetscInt i = 0; i < R.n; i++)
+    if (E.role[i] != TSHHT3_HOLONOMIC) others.push_back(R.start + i);
+  PetscCall(MatDuplicate(E.J, MAT_COPY_VALUES, &B));
+  PetscCall(MatDiagonalScale(B, nullptr, E.d));
+  PetscCall(MatSetOption(B, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
+  PetscCall(MatZeroRows(B, (PetscInt)others.size(), others.data(), 0.5, nullptr, nullptr));
+  PetscCall(MatTranspose(B, MAT_INITIAL_MATRIX, P));
+  PetscCall(MatAXPY(*P, 1, B, DIFFERENT_NONZERO_PATTERN));
+  PetscCall(MatDestroy(&B));
+  PetscFunctionReturn(0);
+}
+
+/* A notice where constraints nearly depend on one another at the positions U, to which a run has been moved */
+PetscErrorCode TellDependent(TS ts, Runtime &R, double t, Vec U)
+{
+  AssemblySystem E(R, t);
+  PetscErrorCode (*name)(TS, Mat, IS, PetscReal, PetscInt, PetscInt *, PetscInt *);
+  constexpr PetscInt max_rows = 4;
+  Mat                P;
+  PetscInt           n, row[max_rows + 1];
+  std::string        names;
+  PetscFunctionBegin;
+  PetscCall(PetscObjectQueryFunction((PetscObject)ts, "TSHHT3NameDependent_C", &name));
+  PetscCall(ISGetSize(R.roles[TSHHT3_HOLONOMIC], &n));
+  if (!n || !name) PetscFunctionReturn(0); /* no name: a TS of another type */
+  PetscCall(E.create(U, "scene_assembly_"));
+  PetscCall(RolesOf(R, E.role));
+  PetscCall(GeometryOfConstraints(E, &P));
+  PetscCall((*name)(ts, P, R.roles[TSHHT3_HOLONOMIC], nearly_dependent, max_rows + 1, &n, row));
+  PetscCall(MatDestroy(&P));
+  for (PetscInt i = 0; i < std::min(n, max_rows); i++) names += (i ? ", " : "") + UnknownName(*R.model, row[i]);
+  if (n)
+    PetscCall(PetscPrintf(R.scene.comm, "scene: at t = %g constraints nearly depend on one another, as at a dead centre (%s%s): velocities, accelerations and loads have few digits there, or none\n", t,
+                          names.c_str(), n > max_rows ? ", ..." : ""));
+  PetscFunctionReturn(0);
+}
+
 /* Follows the motions from `from` to t. Positions that violate the constraints, since the scene was not assembled at
    the start, are first moved to the nearest ones that satisfy them. */
 PetscErrorCode FollowMotions(Runtime &R, double from, double t, Vec U, Vec V)
@@ -439,6 +509,7 @@ PetscErrorCode Assembled(TS ts, PetscReal t, Runtime &R, Vec U, Vec V)
   PetscCall(FollowMotions(R, from, t, U, V));
   PetscCall(TSSetTime(ts, t));
   PetscCall(ToNearestConsistent(ts));
+  PetscCall(TellDependent(ts, R, t, U));
   PetscFunctionReturn(0);
 }
 

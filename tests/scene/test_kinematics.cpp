@@ -92,6 +92,38 @@ TEST(Analyses, KinematicsThroughChangePoints)
   }
 }
 
+/* At a dead centre of a parallelogram, and so near it that rounding is all of its loads, a notice or the error of a singular matrix names the time and the pins. A light body between heavy ones is no reason for it */
+TEST(Analyses, KinematicsAtADeadCentre)
+{
+  for (double before : {0., 1e-8, 1e-6, 1e-2}) {
+    CrankDriven d(.5);
+    d.fourBar(2, 2, 1, 1);
+    OwnTS     run(d.scene);
+    Printed   out;
+    ErrorTrap trap;
+    const bool near = before < 1e-3, failed = Kinematics(run.ts, M_PI - .5 - before) != 0; /* the matrix may be singular to rounding */
+    const std::string said = failed ? trap.message : out.text();
+    EXPECT_EQ(said.find("depend on one another") != std::string::npos, near) << before << ": " << said;
+    EXPECT_EQ(said.find("at t = 2.64159") != std::string::npos, near) << before << ": " << said;
+    EXPECT_EQ(said.find("revolute") != std::string::npos, near) << before << ": " << said;
+  }
+  for (double mass : {1., 1e-18}) {
+    CrankDriven d(.5);
+    RigidBody   light = rod(d.pin, d.pin + Vector3(1, 0, 0)), heavy;
+    light.mass *= mass;
+    light.inertia *= mass;
+    heavy.position     = d.pin + Vector3(1, 0, 0);
+    const Body between = d.scene.add("light", light), block = d.scene.add("heavy", heavy);
+    d.join(d.crank, between, d.pin);
+    d.join(between, block, heavy.position);
+    d.scene.add("rail", Translational{d.scene.marker(block), d.scene.marker(d.scene.ground(), heavy.position)});
+    OwnTS   run(d.scene);
+    Printed out;
+    must(AssembleAt(run.ts, 0));
+    EXPECT_EQ(out.text(), "") << mass;
+  }
+}
+
 /* What locks is not followed to positions beyond; the message says until when it can be */
 TEST(Analyses, KinematicsOfWhatLocks)
 {

@@ -10,6 +10,7 @@
 #include "integrator/equations/rows.h"
 #include "integrator/start/start.h"
 #include "settings.h"
+#include "linear/linear.h"
 
 namespace hht3
 {
@@ -179,6 +180,14 @@ PetscErrorCode GetStatistics(TS ts, TSHHT3Statistics *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For libraries beside this one, whose messages name constraints that depend on one another */
+PetscErrorCode NameDependent(TS, Mat P, IS multipliers, PetscReal tolerance, PetscInt max, PetscInt *n, PetscInt rows[])
+{
+  PetscFunctionBegin;
+  PetscCall(LinearNameDependent(P, multipliers, tolerance, max, n, rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 } // namespace
 
 PetscErrorCode ComposeSetters(TS ts, bool attach)
@@ -205,6 +214,7 @@ PetscErrorCode ComposeSetters(TS ts, bool attach)
   HHT3_COMPOSE(EvaluateAt);
   HHT3_COMPOSE(EvaluatePresent);
   HHT3_COMPOSE(NoteChange);
+  HHT3_COMPOSE(NameDependent);
   HHT3_COMPOSE(CheckpointSave);
   HHT3_COMPOSE(CheckpointLoad);
   HHT3_COMPOSE(ReadCheckpoint);

@@ -383,7 +383,8 @@ class Run(Channels):
     @one_thread
     def kinematics(self, time: Any = None) -> "Run":
         """As `assemble`, for scenes whose joints and motions leave no degree of freedom: loads of a snapshot are those of inverse dynamics.
-        Returns the run.
+        Returns the run. At and near a dead centre, where constraints depend on one another, velocities, accelerations and loads have few digits or
+        none: a notice is printed.
 
         >>> scene.start(assembly="project")  # velocities that follow from motions need not be given
         >>> scene.run().kinematics(0.5).snapshot().load(drive, marker)
