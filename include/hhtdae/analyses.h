@@ -24,6 +24,7 @@
 #ifndef HHTDAE_ANALYSES_H
 #define HHTDAE_ANALYSES_H
 
+#include "hhtdae/types.h"
 #include <petscts.h>
 
 namespace hhtdae
@@ -48,6 +49,10 @@ PetscErrorCode AssembleAt(TS ts, PetscReal t);
    that they have had, what they did meanwhile is not looked at. Near a position where constraints depend on one another, as at a dead centre, velocities,
    accelerations and loads have few digits or none, and a notice names time and rows. */
 PetscErrorCode Kinematics(TS ts, PetscReal t);
+
+/* Sets the velocity of a body (of its centre of mass; of a FlexibleBody: of its frame's origin) and its angular velocity, both in space axes, in the present state of a run, also between steps, as after an impact: null keeps what there is. Modal
+   coordinates keep their rates. Then call TSRestartStep(). Velocities that violate joints are made consistent by a restart as TSHHT3SetStart() says. Collective. */
+PetscErrorCode SetVelocity(TS ts, Body body, const Vector3 *velocity, const Vector3 *angular_velocity);
 
 } // namespace hhtdae
 

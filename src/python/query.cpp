@@ -98,6 +98,10 @@ void BindQuery(py::module_ &m)
   m.def("static_equilibrium", [](py::object ts, double t) { Check(StaticEquilibrium(ToTS(ts), t)); });
   m.def("assemble_at", [](py::object ts, double t) { Check(AssembleAt(ToTS(ts), t)); });
   m.def("kinematics", [](py::object ts, double t) { Check(Kinematics(ToTS(ts), t)); });
+  m.def("set_velocity", [](py::object ts, py::object body, py::object velocity, py::object angular) {
+    const Vector3 v = velocity.is_none() ? Vector3(Vector3::Zero()) : ToVector(velocity, "velocity"), w = angular.is_none() ? Vector3(Vector3::Zero()) : ToVector(angular, "angular_velocity");
+    Check(SetVelocity(ToTS(ts), ToHandle<Body>(body, "body"), velocity.is_none() ? nullptr : &v, angular.is_none() ? nullptr : &w));
+  });
 }
 
 } // namespace python

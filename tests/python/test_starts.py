@@ -247,5 +247,91 @@ class Interrupted(unittest.TestCase):
             self.assertAlmostEqual(scene.solve(1., tolerance=1e-7)["x"][-1], (value - 1) * (1 - np.cos(1.)), delta=1e-4)
 
 
+class Velocities(unittest.TestCase):
+    """Run.set_velocity()"""
+
+    def test_of_a_free_body(self):
+        """In each kind of coordinates, before a run and within it, whatever the body has turned: what is not given stays"""
+        for planar, rotations, point in ((True, "local", False), (True, "local", True), (False, "local", False), (False, "euler313", False), (False, "local", True)):
+            scene, a = h.Scene(planar=planar), 1 - planar
+            scene.start(rotations=rotations)
+            scene.add("other", h.PointMass())
+            w = (0.3 * a, -0.5 * a, 2.)
+            body = scene.add("body", h.PointMass(position=(1, 2, 0), velocity=(1, 0, 0)) if point else h.RigidBody(2., (1, 2, 3.), center=(0.4, 0.1, 0), velocity=(1, 0, 0), angular_velocity=w))
+            last = scene.add("last", h.PointMass(velocity=(0, 3, 0)))
+            run = scene.run(tolerance=1e-8)
+            for until, v, w in ((0.7, (3, -1, 2. * a), (1. * a, 2. * a, -3)), (1.4, (0, 5, 0), None), (2.1, None, (0, 0, 1)), (2.8, None, None)):
+                if point and w and v is None:
+                    continue
+                before = run.snapshot().motion(body)
+                run.set_velocity(body, v, None if point else w)
+                after = run.snapshot().motion(body)
+                np.testing.assert_allclose(after.velocity, before.velocity if v is None else v, atol=1e-12)
+                np.testing.assert_allclose(after.position, before.position, atol=0)
+                if not point:
+                    np.testing.assert_allclose(after.angular_velocity, before.angular_velocity if w is None else w, atol=1e-12)
+                at, kept = run.time, run.snapshot()
+                run.solve(until)
+                moved = run.snapshot()
+                np.testing.assert_allclose(moved.motion(last).velocity, (0, 3, 0), atol=1e-9)
+                self.assertAlmostEqual(moved.energy()[0], kept.energy()[0], delta=1e-3)
+                if point:
+                    np.testing.assert_allclose(moved.motion(body).position, after.position + (until - at) * after.velocity, atol=1e-9)
+
+    def test_bounce(self):
+        """A ball with restitution, and a pendulum that is thrown back at the bottom"""
+        scene = h.Scene(planar=True, gravity=(0, -9.81, 0))
+        ball = scene.add("ball", h.RigidBody(1., (1, 1, 1.), position=(0, 1, 0), velocity=(2, 0, 0), angular_velocity=(0, 0, 5)))
+        run, seen = scene.run(tolerance=1e-6), []
+
+        def bounce(r):
+            v = r.snapshot().motion(ball).velocity
+            seen.append(r.time)
+            r.set_velocity(ball, (v[0], -0.8 * v[1], 0))
+        run.event(h.displacement(ball.marker(), "y"), bounce, direction=-1)
+        run.solve(2.)
+        fall = np.sqrt(2 / 9.81)
+        np.testing.assert_allclose(seen, fall * np.array([1, 2.6, 3.88]), atol=2e-5)
+        self.assertAlmostEqual(run.snapshot().motion(ball).angular_velocity[2], 5, delta=1e-9)
+        self.assertAlmostEqual(run.snapshot().motion(ball).position[0], 4, delta=1e-6)
+
+        scene = h.Scene(gravity=(0, -9.81, 0))
+        rod = scene.add("rod", h.RigidBody(1., (0.1, 0.1, 0.1), position=(0.5, 0, 0), rotation=h.rotation((0, 0, 1), 0.3)))
+        pin = scene.connect("pin", h.Revolute, rod, scene.ground, (0, 0, 0))
+        run, energies = scene.run(tolerance=1e-8), []
+
+        def energy(r):
+            return sum(r.snapshot().energy())
+
+        def back(r):
+            energies.append(energy(r))
+            m = r.snapshot().motion(rod)
+            r.set_velocity(rod, -m.velocity, -m.angular_velocity)
+        run.event(h.displacement(rod.marker(), "x"), back, direction=-1)
+        run.solve(1.5)
+        self.assertGreaterEqual(len(energies), 2)
+        np.testing.assert_allclose(energies + [energy(run)], 0, atol=1e-3)
+        self.assertGreater(run.snapshot().motion(rod).position[0], -1e-6)
+        self.assertIsNotNone(pin)
+
+    def test_against_a_joint(self):
+        """Velocities that a joint does not allow: those after a plastic impact"""
+        scene = h.Scene()
+        rod = scene.add("rod", h.RigidBody(2., (0.1, 0.1, 0.1), position=(0.5, 0, 0)))
+        scene.connect("pin", h.Revolute, rod, scene.ground, (0, 0, 0))
+        run = scene.run(tolerance=1e-8)
+        run.set_velocity(rod, (7, 1, 0))
+        run.solve(1e-3)
+        self.assertAlmostEqual(run.snapshot().motion(rod).angular_velocity[2], 2 * 0.5 * 1 / (2 * 0.25 + 0.1), delta=1e-6)
+
+    def test_mistakes(self):
+        scene = h.Scene(planar=True)
+        point = scene.add("point", h.PointMass())
+        run = scene.run()
+        for arguments, text in (((scene.ground, (1, 0, 0)), "not the ground"), ((point, (1, 0, 1)), "point leaves the plane"), ((point, None, (0, 0, 1)), "point is a point mass")):
+            with self.assertRaisesRegex(h.Error, text):
+                run.set_velocity(*arguments)
+
+
 if __name__ == "__main__":
     unittest.main()

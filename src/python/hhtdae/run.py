@@ -227,8 +227,8 @@ class Run(Channels):
             of it. By its formula and direction an event is recognized in a run that continues this one, by `load` or ``Scene.run(after=)``: it
             does not find again what has been found.
         action : callable, optional
-            action(run) is called at each passage; it may change parameters, or velocities in ``run.ts.getSolution2()``. If it changes the
-            behaviour of a callback, it has to call `restart`.
+            action(run) is called at each passage; it may change parameters, or velocities: see `set_velocity`. If it changes the behaviour of a
+            callback, it has to call `restart`.
         terminal : bool
             Whether the run ends at the passage.
         direction : {0, 1, -1}
@@ -331,9 +331,11 @@ class Run(Channels):
         """Makes restarts project the initial values: interpolated velocities at an event satisfy the constraints only up to the tolerance of the
         step, and positions do not satisfy a constraint whose parameter has been changed. This is done for all restarts of a run with events or
         such constraints that has begun, so that a run resumed from a checkpoint continues as the original one: test Checkpoints of test_events.py."""
-        chosen = PETSc.Options().hasName("ts_hhtdae_start") or "ts_hhtdae_start" in [name.lstrip("-") for name in self._options]
-        if (self._events or self.scene._constraints_jump) and not chosen:
+        if (self._events or self.scene._constraints_jump) and not self._start_is_chosen():
             integrator.set_start(self._open(), "project")
+
+    def _start_is_chosen(self):
+        return PETSc.Options().hasName("ts_hhtdae_start") or "ts_hhtdae_start" in [name.lstrip("-") for name in self._options]
 
     def restart(self) -> None:
         """Restarts the integrator, which then uses no values of earlier steps. To be called after a callback, or a parameter within a run, has
@@ -342,6 +344,28 @@ class Run(Channels):
         self._open().restartStep()
         if self.steps:
             self._project_restarts()
+
+    @one_thread
+    def set_velocity(self, body, velocity: Any = None, angular_velocity: Any = None) -> None:
+        """Sets the velocity of a body's centre of mass (of a `FlexibleBody`: of its frame) and its angular velocity, in space axes, in the present
+        state of the run, for example after an impact in the action of an event; None keeps what there is. Positions are not changed, nor are the rates of modal coordinates. The
+        integrator restarts, and velocities that violate joints are removed as in a plastic impact, unless the option -ts_hhtdae_start is given. Collective.
+
+        >>> def bounce(run):  # coefficient of restitution 0.8
+        ...     v = run.snapshot().motion(ball).velocity
+        ...     run.set_velocity(ball, (v[0], -0.8 * v[1], v[2]))
+        >>> run.event(height, bounce, direction=-1)
+
+        All velocities together are in the second vector of ``run.ts.getSolution2()``, the bodies in the order in which they were added (on several
+        ranks those of each rank): of a rigid body the velocity of the centre of mass, 3 entries, and its angular velocity, 3 entries, both in space
+        axes (with ``scene.start(rotations="euler313")`` the rates of the angles); of a point mass 3 entries; in planar scenes 3 and 2; of a
+        `FlexibleBody` the rates of its modal coordinates follow. After all bodies there are entries of multipliers, force states, variables and
+        states.
+        """
+        _core.set_velocity(self._open(), body, velocity, angular_velocity)
+        if not self._start_is_chosen():
+            integrator.set_start(self._open(), "project")
+        self.restart()
 
     def on_step(self, function: Callable[["Run"], Any]) -> None:
         """Calls function(run) after every step. If the function sets parameters that make a formula jump, it has to call `restart`."""
