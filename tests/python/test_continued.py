@@ -91,8 +91,8 @@ class Angles(Folder):
         run.solve(2.).save(self.file)
         scene, _, body = wheel(counted=False)
         run = scene.run(tolerance=1e-6)
-        other = body.marker(axes=h.rotation((0, 0, 1), -1.))
-        self.assertAlmostEqual(run.load(self.file).snapshot().value(h.angle(other, scene.ground.marker())), 19. - 6 * np.pi, delta=1e-5)
+        other = h.angle(body.marker(axes=h.rotation((0, 0, 1), -1.)), scene.ground.marker())
+        self.assertAlmostEqual(run.load(self.file).snapshot().value(other), 19. - 6 * np.pi, delta=1e-5)
 
     def test_counted_by_nobody(self):
         scene, angle, _ = wheel(counted=False)

@@ -194,7 +194,7 @@ class Arguments(unittest.TestCase):
         scene = h.Scene()
         mass = scene.add("weight", h.PointMass())
         scene.add("wind", h.UserForce(mass.marker(), force=(h.callback(lambda t: math.nan if t > 0.1 else 0., h.time()), 0., 0.)))
-        with self.assertRaisesRegex(h.Error, r"row 0 \(x of body weight\)"):
+        with self.assertRaisesRegex(h.Error, r"row 0 \(x of body weight; user force wind is not a number\)"):
             scene.solve(1.)
 
     def test_names_in_messages(self):
