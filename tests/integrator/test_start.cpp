@@ -368,6 +368,40 @@ TEST(Start, RedundantConstraintsAreNamed)
   }
 }
 
+/* As at a dead centre, where rounding makes the matrix singular although the constraints are not quite dependent */
+TEST(Start, NearlyDependentConstraintsAreNamed)
+{
+  constexpr double e = 1e-8;
+  struct NearlyDependent : Redundant { /* q_1 = 0, q_1 + e q_2 = 0, where 1 + e^2 is 1 in floating point */
+    void initial(double *u, double *v) const override
+    {
+      for (int i = 0; i < 4; i++) u[i] = v[i] = 0.;
+    }
+    void residual(double, const double *u, const double *, const double *a, double *f) const override
+    {
+      f[0] = a[0] + u[2] + u[3];
+      f[1] = a[1] + e * u[3] + 9.81;
+      f[2] = u[0];
+      f[3] = u[0] + e * u[1];
+    }
+    void jacobian(double, const double *, const double *, const double *, double, double sa, Entries &J) const override
+    {
+      J.add(0, 0, sa);
+      J.add(1, 1, sa);
+      for (int c : {2, 3}) {
+        J.add(0, c, 1.);
+        J.add(c, 0, 1.);
+      }
+      J.add(1, 3, e);
+      J.add(3, 1, e);
+    }
+  } p;
+  Simulation run(p, "");
+  ErrorTrap  trap;
+  EXPECT_EQ(run.step(), PETSC_ERR_MAT_LU_ZRPVT);
+  EXPECT_TRUE(trap.says("rows 2, 3 nearly depend on one another")) << trap.message;
+}
+
 TEST(Start, SingularMassIsNotBlamedOnConstraints)
 {
   const SharedMass p;

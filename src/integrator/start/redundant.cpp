@@ -122,6 +122,10 @@ PetscErrorCode NameRedundant(TS ts)
   PetscCheck(!d.n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s depend on one another. Remove the redundant ones.%s", (double)ts->ptime, d.numbers.c_str(),
              d.names.c_str());
+  PetscCall(FindDependent(ts, P, locked, &d));
+  PetscCheck(!d.n, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
+             "The matrix [M Phi_q^T; Phi_q 0] is singular at t = %g: the constraints in rows %s nearly depend on one another, as at a dead centre, where accelerations and multipliers are not determined.%s",
+             (double)ts->ptime, d.numbers.c_str(), d.names.c_str());
   PetscCall(PackageInDoubt(ts, &package));
   PetscCheck(!package, PetscObjectComm((PetscObject)ts), PETSC_ERR_MAT_LU_ZRPVT,
              "%s has met a zero pivot in the matrix [M Phi_q^T; Phi_q 0] at t = %g, whose constraints do not depend on one another. The cause may be this package, as multipliers have zeros on the diagonal: "
