@@ -268,7 +268,10 @@ class Linearization:
         own = now["square_rate"]  # a motion that nothing drives back has no rate of its own: the scene's counts
         squares = [x if x > max(1e-4 * own, now["rounding"]) else own for x in (abs(rate)**2 for rate in (rates() if callable(rates) else rates))]
         square = min((x for x in squares if x), default=0.)
-        limit = 1e-3 * square
+        if squares and not square:  # none but rounding: beside it any motion is fast
+            square, limit = now["rounding"], now["rounding"]
+        else:
+            limit = 1e-3 * square
         if not square or now["change" if sparse else "elastic_change"] <= limit:
             return
         elastic = now["elastic_change"] > limit
