@@ -134,7 +134,7 @@ struct ModalLoad {
   Adaptive steps end within contacts and stops that velocities and accelerations foresee, so that none is passed over that changes positions by
   more than the tolerance. NodeContact, user's forces and steps of fixed length have no such look-ahead: -ts_adapt_dt_max keeps their steps
   short. Within a contact only the error of positions chooses the steps: the speed after an elastic impact is right to 5 % if the tolerance is a
-  hundredth of the penetration, and to 50 % if it is a third. A tolerance near the penetration or above it lets impacts gain energy.
+  hundredth of the penetration, and to some 50 % if it is a third (LookAhead.ElasticImpactsByTolerance). A tolerance near the penetration or above it lets impacts gain energy.
 
   Components: the force on i's body, normal force and friction together, in j's axes (SphereSphere: in space axes). It acts at the point of
   contact.

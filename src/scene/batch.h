@@ -140,10 +140,10 @@ template <class K, class Instance> double BeforeContact(const Instance &e, const
   const Bodies  &B = ev.bodies;
   MarkerForecast m[2];
   for (int k = 0; k < 2; k++) {
-    const PetscInt    b = B.marker[e.marker[k]].body;
-    const BodyMotion &x = B.now[b];
+    const PetscInt      b = B.marker[e.marker[k]].body;
+    const BodyMotion   &x = B.now[b];
     const Frame<double> f = B.frame<true>(e.marker[k]);
-    m[k] = {f, f.x - x.r, x.r, x.v, B.acceleration(b, ev.v, ev.a), x.w, B.angularAcceleration(b, ev.v, ev.a)};
+    m[k]                  = {f, f.x - x.r, x.r, x.v, B.acceleration(b, ev.v, ev.a), x.w, B.angularAcceleration(b, ev.v, ev.a)};
   }
   const auto gap = [&](double t) {
     const Frame<double> f[2] = {m[0].at(t), m[1].at(t)};

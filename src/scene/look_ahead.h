@@ -3,8 +3,8 @@
   behind a contact. So a step ends no later than in the part of a foreseen contact in which the bodies still approach, where the force then shows.
 
   Foreseen is what the accelerations at the beginning of the step lead to: bodies' centres move along parabolas and turn about a fixed axis. The time of
-  touch is found by conservative advancement (Mirtich, Impulse-based Dynamic Simulation of Rigid Body Systems, 1996, section 2.3): with a bound A of the second
-  derivative of the gap no contact is closer than the root of g + g' t - A t^2/2.
+  touch is found by conservative advancement (Mirtich, Impulse-based Dynamic Simulation of Rigid Body Systems, thesis, Berkeley 1996): with a bound A of the
+  second derivative of the gap g there is no contact before the root of g + g' t - A t^2/2.
 */
 #ifndef HHTDAE_SCENE_LOOK_AHEAD_H
 #define HHTDAE_SCENE_LOOK_AHEAD_H
@@ -20,11 +20,11 @@ namespace hhtdae
 /* The foreseen motion of a marker */
 struct MarkerForecast {
   Frame<double> now;
-  Vector3       arm;                         /* of the marker's origin from the body's centre */
+  Vector3       arm;                            /* of the marker's origin from the body's centre */
   Vector3       center, velocity, acceleration; /* of the body's centre */
-  Vector3       w, alpha;                    /* angular velocity and acceleration of the body */
+  Vector3       w, alpha;                       /* angular velocity and acceleration of the body */
 
-  bool          turns() const { return w.squaredNorm() > 0 || alpha.squaredNorm() > 0; }
+  bool turns() const { return w.squaredNorm() > 0 || alpha.squaredNorm() > 0; }
   Frame<double> at(double t) const
   {
     Frame<double> f = now;
@@ -71,7 +71,7 @@ template <class Gap> double LongestBeforeContact(const Gap &gap, const GapBounds
   constexpr double close     = 1e-3; /* part of the first gap that counts as touch */
   constexpr double no_deeper = 1.5;  /* bodies in contact that get deeper by less than this factor rest on each other or vibrate */
   constexpr double shortest  = 1e-6; /* part of the horizon */
-  const double     horizon = h.time, begin = gap(0.), difference = 1e-6 * horizon;
+  const double     horizon   = h.time, begin = gap(0.), difference = 1e-6 * horizon;
   const auto       rate = [&](double at) { return (gap(at + difference) - gap(at)) / difference; };
   double           t = 0, g = begin;
   if (!std::isfinite(begin) || most.change(horizon) < (begin > 0 ? begin : (1 - no_deeper) * begin)) return horizon;

@@ -126,3 +126,28 @@ TEST(LookAhead, AStopBelowTheTurningPoint)
     EXPECT_NEAR(VelocityAt(s, rim, 2, eps).norm(), 1.5351, 0.03) << eps; /* Runge and Kutta, eight digits */
   }
 }
+
+/* The speed after an elastic impact for tolerances of a hundredth and a third of the penetration, from 24 distances: the figures of ContactLaw, hhtdae/forces.h */
+TEST(LookAhead, ElasticImpactsByTolerance)
+{
+  const double stiffness = 1e7, penetration = std::pow(1.25 / stiffness, 0.4);
+  for (double ratio : {100., 3.}) {
+    double least = infinity, most = 0;
+    for (int k = 0; k < 24; k++) {
+      Scene     s(PETSC_COMM_SELF);
+      RigidBody b;
+      b.position     = {0, 0, 0.15 + 0.01 * k / 24};
+      b.velocity     = {0, 0, -1};
+      const Marker i = s.marker(s.add("ball", b));
+      ContactLaw   law;
+      law.stiffness = stiffness;
+      s.add("floor", SpherePlane{i, s.marker(s.ground()), 0.1, law});
+      const double after = VelocityAt(s, i, 0.2, penetration / ratio)(2);
+      least              = std::min(least, after);
+      most               = std::max(most, after);
+    }
+    MEASURED("tolerance 1/%g of the penetration: %.3f to %.3f", ratio, least, most);
+    EXPECT_GT(least, ratio > 10 ? 0.94 : 0.4);
+    EXPECT_LT(most, ratio > 10 ? 1.06 : 1.6);
+  }
+}

@@ -175,7 +175,7 @@ class ContactLaw(Spec):
     The default values are for metres, newtons and seconds. Steps end within contacts and stops that velocities and accelerations foresee, so that none is passed over that
     changes positions by more than the tolerance; `NodeContact`, formulas and steps of fixed length have no such look-ahead: ``options={"ts_adapt_dt_max": ...}``. Within a
     contact only the error of positions chooses the steps: the speed after an elastic impact is right to 5 % if the tolerance is a hundredth of the penetration, and
-    to 50 % if it is a third. A tolerance near the penetration or above it lets impacts gain energy."""
+    to some 50 % if it is a third. A tolerance near the penetration or above it lets impacts gain energy."""
     stiffness: Number = 1e5
     exponent: Number = 1.5
     damping: Number = 0.
